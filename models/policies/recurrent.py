@@ -1,0 +1,236 @@
+"""The recurrent communicating policy: encoder, first LSTM, message and gate, second LSTM, heads.
+
+    observation -> encoder -> LSTM 1 -> message, gate          (``speak``)
+    inbox, LSTM 1 -> LSTM 2 -> action, value                   (``act``)
+
+Message and gate are made from [hidden 1, encoded observation], the heads read [hidden 2, inbox, encoded observation]
+and the product of two linear maps of inbox and encoded observation: "is my next cell among theirs" is a match, which no
+linear head can see. Shapes: R rows (living agents), O observation, H hidden, D message, K tokens, A actions.
+"""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor, nn
+
+from models.policies.api import RandomDraws, Speech
+from models.policies.channels import OneHotChannel, PrototypeChannel, gate_of, make_channel, pick
+
+MEMORY_PARTS = 5  # hidden 1, cell 1, hidden 2, cell 2, and the encoded observation kept between speak and act
+TRAINING_ONLY = ("decoder.", "critic.")  # weights that no one needs in order to play
+
+
+@dataclass(frozen=True, slots=True)
+class Architecture:
+    """Every size that the weights depend on; part of a bundle's manifest."""
+
+    observation_size: int
+    """Floats per observation, O."""
+    actions: int
+    """Number of actions, A."""
+    hidden: int
+    """Width of encoder and LSTMs, H."""
+    message: int
+    """Floats per message, D."""
+    tokens: int
+    """Codebook size K; 0 for a channel without codebook."""
+    channel: str
+    """none, continuous, prototype or one-hot."""
+    gate: str
+    """open (every message is sent) or learned."""
+
+    def __post_init__(self) -> None:
+        if self.gate not in ("open", "learned"):
+            raise ValueError(f"gate is {self.gate!r}; choose open or learned")
+        if min(self.observation_size, self.actions, self.hidden, self.message) < 1:
+            raise ValueError("observation_size, actions, hidden and message must be at least 1")
+
+    def to_dict(self) -> dict[str, Any]:
+        return asdict(self)
+
+
+class Said(NamedTuple):
+    """What ``RecurrentNet.speak`` makes of R rows, with gradients."""
+
+    token: Tensor
+    """(R,) int64, -1 where the channel has no codebook."""
+    message: Tensor
+    """(R, D)"""
+    gate: Tensor
+    """(R,) 0.0 or 1.0"""
+    gate_logit: Tensor
+    """(R,)"""
+    memory: Tensor
+    """(R, 5H)"""
+    raw: Tensor
+    """(R, D) before the channel"""
+    loss: Tensor
+    """scalar: upkeep of the codebook"""
+
+
+class Done(NamedTuple):
+    """What ``RecurrentNet.act`` makes of R rows: action logits (R, A), memory (R, 5H), features (R, F)."""
+
+    logits: Tensor
+    memory: Tensor
+    features: Tensor
+
+
+class RecurrentNet(nn.Module):
+    """The weights. Heads that only training needs (value, decoder) are added by the trainer."""
+
+    def __init__(self, architecture: Architecture) -> None:
+        super().__init__()
+        a, hidden = architecture, architecture.hidden
+        self.architecture = architecture
+        self.encoder = nn.Sequential(
+            nn.Linear(a.observation_size, hidden), nn.ReLU(), nn.Linear(hidden, hidden), nn.Tanh()
+        )
+        self.first = nn.LSTMCell(hidden, hidden)
+        self.speech = nn.Sequential(nn.Linear(2 * hidden, hidden), nn.ReLU(), nn.Linear(hidden, a.message))
+        self.gate = nn.Linear(2 * hidden, 1) if a.gate == "learned" else None
+        self.channel = make_channel(a.channel, a.tokens, a.message)
+        self.second = nn.LSTMCell(hidden + a.message, hidden)
+        self.match_inbox = nn.Linear(a.message, hidden)
+        self.match_own = nn.Linear(hidden, hidden)
+        self.head = nn.Sequential(
+            nn.Linear(self.features, hidden), nn.ReLU(), nn.Linear(hidden, a.actions)
+        )
+
+    @property
+    def features(self) -> int:
+        """Floats that the heads read: hidden 2, inbox, encoded observation, match."""
+        return 3 * self.architecture.hidden + self.architecture.message
+
+    @property
+    def memory_size(self) -> int:
+        return MEMORY_PARTS * self.architecture.hidden
+
+    def speak(
+        self, memory: Tensor, observation: Tensor, draws: Tensor | None = None, *, discrete: bool = True
+    ) -> Said:
+        """From memory (R, 5H) and observation (R, O) to message and gate.
+
+        Args:
+            memory: what ``act`` returned at the last step; zeros for a newcomer.
+            observation: (R, O).
+            draws: uniform numbers (R, 2), first for the token, second for the gate; greedy without.
+            discrete: False sends the raw vector instead of its prototype (training before quantisation).
+        """
+        hidden1, cell1, hidden2, cell2, _ = memory.split(self.architecture.hidden, dim=1)
+        encoded = self.encoder(observation)
+        hidden1, cell1 = self.first(encoded, (hidden1, cell1))
+        source = torch.cat((hidden1, encoded), 1)
+        raw = self.speech(source)
+        if self.architecture.channel != "one-hot":
+            raw = torch.tanh(raw)
+        token, message, loss = self._utter(raw, draws, discrete)
+        logit = self._gate_logit(source)
+        gate = torch.ones_like(logit) if self.gate is None else gate_of(logit, None if draws is None else draws[:, 1])
+        if self.architecture.channel == "none":
+            gate = torch.zeros_like(logit)
+        memory = torch.cat((hidden1, cell1, hidden2, cell2, encoded), 1)
+        return Said(token, message, gate, logit, memory, raw, loss)
+
+    def _utter(self, raw: Tensor, draws: Tensor | None, discrete: bool) -> tuple[Tensor, Tensor, Tensor]:
+        if isinstance(self.channel, OneHotChannel):
+            return self.channel(raw, None if draws is None else draws[:, 0])  # type: ignore[no-any-return]
+        token, message, loss = self.channel(raw)
+        return token, message if discrete or self.architecture.channel == "none" else raw, loss
+
+    def _gate_logit(self, source: Tensor) -> Tensor:
+        if self.gate is None:
+            return source.new_full((source.shape[0],), 20.0)  # open with probability 1 - 2e-9
+        return self.gate(source).squeeze(1)  # type: ignore[no-any-return]
+
+    def act(self, memory: Tensor, inbox: Tensor) -> Done:
+        """From the memory (R, 5H) that ``speak`` returned and the inbox (R, D) to action logits."""
+        hidden1, cell1, hidden2, cell2, encoded = memory.split(self.architecture.hidden, dim=1)
+        hidden2, cell2 = self.second(torch.cat((hidden1, inbox), 1), (hidden2, cell2))
+        match = self.match_inbox(inbox) * self.match_own(encoded)
+        features = torch.cat((hidden2, inbox, encoded, match), 1)
+        memory = torch.cat((hidden1, cell1, hidden2, cell2, encoded), 1)
+        return Done(self.head(features), memory, features)
+
+
+class RecurrentPolicy:
+    """The weights as a ``Policy``: numpy in, numpy out, no gradients."""
+
+    def __init__(self, net: RecurrentNet) -> None:
+        self.net = net.eval()
+        self.architecture = net.architecture
+        self.channel = net.architecture.channel
+        self.tokens = net.architecture.tokens
+        self.message_size = net.architecture.message
+        self.hidden_size = net.memory_size
+        self._vectors = _vectors(net)
+
+    @classmethod
+    def from_weights(cls, architecture: Architecture, weights: Mapping[str, Tensor]) -> "RecurrentPolicy":
+        """Build the policy around stored weights.
+
+        Raises:
+            ValueError: a weight is missing, unknown or of another shape.
+        """
+        net = RecurrentNet(architecture)
+        expected = net.state_dict()
+        if odd := sorted(set(expected) ^ set(weights)):
+            raise ValueError(f"weights do not fit the architecture: {odd[0]} is missing or unknown")
+        for name, tensor in expected.items():
+            if tensor.shape != weights[name].shape:
+                raise ValueError(f"{name} has shape {tuple(weights[name].shape)}, not {tuple(tensor.shape)}")
+        net.load_state_dict(dict(weights))
+        return cls(net)
+
+    def weights(self) -> dict[str, Tensor]:
+        """What a bundle stores: name to tensor, contiguous float32."""
+        return {name: tensor.detach().contiguous() for name, tensor in self.net.state_dict().items()}
+
+    def speak(
+        self, hidden: NDArray[np.float32], observation: NDArray[np.float32], sampled: RandomDraws | None = None
+    ) -> Speech:
+        draws = None
+        if sampled is not None:
+            draws = torch.from_numpy(np.stack([sampled.uniform(len(hidden)) for _ in range(2)], 1))
+        with torch.inference_mode():
+            said = self.net.speak(torch.from_numpy(hidden), torch.from_numpy(observation), draws)
+        return Speech(
+            said.token.numpy().astype(np.int32),
+            said.gate.numpy() >= 0.5,  # noqa: PLR2004
+            said.message.numpy(),
+            said.memory.numpy(),
+        )
+
+    def act(
+        self, hidden: NDArray[np.float32], inbox: NDArray[np.float32], sampled: RandomDraws | None = None
+    ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+        with torch.inference_mode():
+            done = self.net.act(torch.from_numpy(hidden), torch.from_numpy(inbox))
+            if sampled is None:
+                action = done.logits.argmax(1)
+            else:
+                action = pick(done.logits.softmax(1), torch.from_numpy(sampled.uniform(len(hidden))))
+        return action.numpy().astype(np.int32), done.memory.numpy()
+
+    def vector(self, tokens: NDArray[np.int32]) -> NDArray[np.float32]:
+        return self._vectors[tokens]
+
+    @property
+    def codebook(self) -> NDArray[np.float32]:
+        """Message vectors of all tokens, (K, D)."""
+        return self._vectors[:-1]
+
+
+def _vectors(net: RecurrentNet) -> NDArray[np.float32]:
+    """(K + 1, D): vectors of the tokens, then zeros, which is where SILENT (-1) points."""
+    architecture = net.architecture
+    table = np.zeros((architecture.tokens + 1, architecture.message), dtype=np.float32)
+    if isinstance(net.channel, PrototypeChannel):
+        table[:-1] = net.channel.codebook.detach().numpy()
+    elif architecture.channel == "one-hot":
+        table[:-1] = np.eye(architecture.tokens, dtype=np.float32)
+    return table
