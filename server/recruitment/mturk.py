@@ -1,0 +1,35 @@
+"""Mechanical Turk: parameters of an ExternalQuestion and the form that ends an assignment.
+
+The page stands in an iframe of the worker site. A preview (no assignment yet) must store nothing.
+Source: the ExternalQuestion article of the MTurk API reference.
+"""
+
+from collections.abc import Mapping
+
+from server.recruitment.arrival import Arrival, ExitLink
+
+PARAMETERS = ("workerId", "assignmentId", "hitId", "turkSubmitTo")
+NO_ASSIGNMENT = "ASSIGNMENT_ID_NOT_AVAILABLE"
+SUBMIT_HOSTS = ("https://www.mturk.com", "https://workersandbox.mturk.com")  # anything else: open redirect
+FRAME_HOSTS = ("https://worker.mturk.com", *SUBMIT_HOSTS)
+
+
+def recognise(query: Mapping[str, str]) -> Arrival | None:
+    """The arrival, where the link comes from MTurk; a preview has no worker and no assignment."""
+    assignment = query.get("assignmentId", "")
+    if not assignment:
+        return None
+    found = {name: query[name] for name in PARAMETERS if query.get(name)}
+    worker = query.get("workerId", "")
+    if assignment == NO_ASSIGNMENT or not worker:
+        return Arrival("mturk", preview=True, parameters=found)
+    return Arrival("mturk", worker, assignment, parameters=found)
+
+
+def exit_link(code: str, parameters: Mapping[str, str]) -> ExitLink | None:
+    """The form that submits the assignment; none where `turkSubmitTo` is not one of MTurk's two hosts."""
+    host = parameters.get("turkSubmitTo", "").rstrip("/")
+    assignment = parameters.get("assignmentId", "")
+    if host not in SUBMIT_HOSTS or not assignment:
+        return None
+    return ExitLink(f"{host}/mturk/externalSubmit", {"assignmentId": assignment, "code": code})
