@@ -16,20 +16,20 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
+import torch
 from safetensors import SafetensorError
-from safetensors.numpy import load as parse_tensors
-from safetensors.numpy import save as tensor_bytes
+from safetensors.torch import load as parse_tensors
+from safetensors.torch import save as tensor_bytes
 
 from models.envs import registry
 from models.policies.lexicon import Lexicon, LexiconError
+from models.policies.recurrent import Architecture, RecurrentPolicy
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from numpy.typing import NDArray
-
     from models.policies.api import Policy
+
 
 FORMAT = 1
 MANIFEST, WEIGHTS, LEXICON, EVALUATION, CARD = (
@@ -40,6 +40,7 @@ MANIFEST, WEIGHTS, LEXICON, EVALUATION, CARD = (
     "CARD.md",
 )
 HASHED = (WEIGHTS, LEXICON, EVALUATION, CARD)
+SIZE_MAX = 4096  # a manifest may not make the loader allocate without limit
 NAME = re.compile(r"[a-z0-9_]+/[a-z0-9-]+")
 
 
@@ -57,9 +58,9 @@ class Manifest:
         task: name of the environment it was trained for.
         task_version: version of that environment's rules.
         channel: what a message is: prototype or one-hot.
-        gate: who decides whether to speak: open, learned or enforced.
-        budget: share of steps at which an agent may speak, 1 for an open gate.
-        sizes: every size from which the shapes of the weights follow.
+        gate: open (every message is sent) or learned.
+        budget: share of steps at which an agent was trained to speak, 1 for an open gate.
+        sizes: every size from which the shapes of the weights follow (fields of `Architecture`).
         seed: seed of the training.
         steps_trained: environment steps seen in training.
         warm_start: what the weights were started from besides chance; None for nothing.
@@ -118,7 +119,7 @@ def load(path: Path | str) -> PolicyBundle:
     manifest = _manifest(raw)
     files = _files(folder, manifest)
     _check_task(manifest)
-    policy = _policy(manifest, _tensors(files[WEIGHTS]))
+    policy = _policy(manifest, files[WEIGHTS])
     lexicon = _lexicon(manifest, files[LEXICON])
     evaluation = _object(EVALUATION, files[EVALUATION])
     return PolicyBundle(manifest.name, manifest, policy, lexicon, evaluation, sha256(raw))
@@ -152,7 +153,7 @@ def _load_named(root: Path, name: str) -> PolicyBundle:
 def save(  # one argument for each file
     root: Path | str,
     manifest: Manifest,
-    tensors: Mapping[str, NDArray[np.float32]],
+    weights: Mapping[str, torch.Tensor],
     lexicon: Lexicon,
     evaluation: Mapping[str, Any],
     card: str,
@@ -164,7 +165,7 @@ def save(  # one argument for each file
     folder = Path(root) / manifest.name
     folder.mkdir(parents=True, exist_ok=True)
     contents = {
-        WEIGHTS: tensor_bytes({name: np.ascontiguousarray(value) for name, value in tensors.items()}),
+        WEIGHTS: tensor_bytes(dict(weights)),
         LEXICON: _json_bytes(lexicon.to_json(), indent=None),
         EVALUATION: _json_bytes(evaluation),
         CARD: card.encode(),
@@ -258,33 +259,44 @@ def _check_task(manifest: Manifest) -> None:
             f"{MANIFEST}: trained for version {manifest.task_version} of {manifest.task}, "
             f"this hatlab plays version {env.version}"
         )
-    wanted = {"observation": env.observation_size, "actions": env.actions}
-    for name, size in wanted.items():
+    for name, size in {"observation_size": env.observation_size, "actions": env.actions}.items():
         if manifest.sizes.get(name) != size:
             found = manifest.sizes.get(name)
-            raise BundleError(f"{MANIFEST}: {name} size is {found}, {manifest.task} has {size}")
+            raise BundleError(f"{MANIFEST}: {name} is {found}, but {manifest.task} has {size}")
 
 
-def _tensors(raw: bytes) -> dict[str, NDArray[np.float32]]:
+def _architecture(manifest: Manifest) -> Architecture:
+    if manifest.channel not in ("prototype", "one-hot"):
+        raise BundleError(
+            f"{MANIFEST}: channel {manifest.channel!r} has no tokens; prototype or one-hot needed"
+        )
+    if max(manifest.sizes.values(), default=0) > SIZE_MAX:
+        raise BundleError(f"{MANIFEST}: a size is above {SIZE_MAX}")
     try:
-        tensors: dict[str, NDArray[np.float32]] = parse_tensors(raw)
+        return Architecture(**manifest.sizes, channel=manifest.channel, gate=manifest.gate)
+    except (TypeError, ValueError) as error:
+        raise BundleError(f"{MANIFEST}: sizes or gate cannot be ({_line(error)})") from None
+
+
+def _policy(manifest: Manifest, raw: bytes) -> RecurrentPolicy:
+    architecture = _architecture(manifest)
+    try:
+        return RecurrentPolicy.from_weights(architecture, _weights(raw))
+    except ValueError as error:
+        raise BundleError(f"{WEIGHTS}: {_line(error)}") from None
+
+
+def _weights(raw: bytes) -> dict[str, torch.Tensor]:
+    try:
+        weights: dict[str, torch.Tensor] = parse_tensors(raw)
     except (SafetensorError, KeyError, ValueError) as error:
         raise BundleError(f"{WEIGHTS}: not a whole safetensors file ({_line(error)})") from None
-    for name, value in tensors.items():
-        if value.dtype != np.float32:
-            raise BundleError(f"{WEIGHTS}: {name} holds {value.dtype}, expected float32")
-        if not np.isfinite(value).all():
+    for name, tensor in weights.items():
+        if tensor.dtype != torch.float32:
+            raise BundleError(f"{WEIGHTS}: {name} holds {tensor.dtype}, expected float32")
+        if not bool(torch.isfinite(tensor).all()):
             raise BundleError(f"{WEIGHTS}: {name} holds a number that is not finite (NaN or infinity)")
-    return tensors
-
-
-def _policy(manifest: Manifest, tensors: dict[str, NDArray[np.float32]]) -> Policy:
-    from models.policies.recurrent import RecurrentPolicy
-
-    try:
-        return RecurrentPolicy.from_tensors(manifest.channel, manifest.gate, manifest.sizes, tensors)
-    except (KeyError, ValueError, RuntimeError) as error:
-        raise BundleError(f"{WEIGHTS}: does not fit the sizes in the manifest ({_line(error)})") from None
+    return weights
 
 
 def _lexicon(manifest: Manifest, raw: bytes) -> Lexicon:
@@ -292,7 +304,7 @@ def _lexicon(manifest: Manifest, raw: bytes) -> Lexicon:
         lexicon = Lexicon.from_json(_object(LEXICON, raw))
     except LexiconError as error:
         raise BundleError(f"{LEXICON}: {error}") from None
-    wanted = manifest.sizes.get("tokens"), registry.make(manifest.task).cells
+    wanted = manifest.sizes["tokens"], registry.make(manifest.task).cells
     if (lexicon.tokens, lexicon.cells) != wanted:
         found = lexicon.tokens, lexicon.cells
         raise BundleError(f"{LEXICON}: (tokens, cells) is {found}, weights and task have {wanted}")
