@@ -1,0 +1,40 @@
+"""The settings of one server, read once from the environment (`HATLAB_…`). Nothing else reads the environment."""
+
+from pathlib import Path
+
+from pydantic import Field, SecretStr, field_validator
+from pydantic_settings import BaseSettings, SettingsConfigDict
+
+PACKAGED_BUNDLES = Path(__file__).parents[1] / "models" / "bundles"
+
+
+class Settings(BaseSettings):
+    model_config = SettingsConfigDict(env_prefix="HATLAB_", frozen=True, extra="ignore")
+
+    database_url: str = "sqlite:///var/hatlab.sqlite3"
+    """SQLAlchemy URL. SQLite paths with three slashes are relative to the working directory."""
+    admin_password: SecretStr | None = None
+    """Password of the first admin. Unset: `hatlab init` draws one and prints it once."""
+    secret_key: SecretStr | None = None
+    """Root of participant keys and signatures. Unset: `hatlab init` draws one and keeps it in the database."""
+    public_url: str = "http://127.0.0.1:8000"
+    """Where browsers reach this server; participant links begin with it."""
+    bundles: Path = PACKAGED_BUNDLES
+    """Folder of released agents: `<task>/<name>/manifest.json`."""
+    behind_https: bool = False
+    """True behind a TLS proxy: cookies are Secure and HSTS is sent."""
+    trial_cache: int = Field(default=256, ge=0)
+    """Folded trials kept in memory by each worker; 0 turns the cache off. Never changes an answer."""
+    body_max_bytes: int = Field(default=65_536, ge=1_024)
+    """Largest request body that is read."""
+
+    @field_validator("public_url")
+    @classmethod
+    def without_final_slash(cls, url: str) -> str:
+        return url.rstrip("/")
+
+    @field_validator("secret_key", "admin_password")
+    @classmethod
+    def not_empty(cls, secret: SecretStr | None) -> SecretStr | None:
+        """An empty variable means unset, not an empty secret."""
+        return secret if secret and secret.get_secret_value() else None

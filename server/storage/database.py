@@ -1,0 +1,181 @@
+"""One database, SQLite or PostgreSQL, and the transactions on it.
+
+`reading()` sees one snapshot. `writing()` commits when its block ends without an error, and nobody else commits. On SQLite
+a writing transaction takes the one write lock at its first write (`BEGIN IMMEDIATE`) and not before, so that a decision can
+be computed without keeping others waiting; whoever must decide on what was read takes the lock first (`DbSession.hold`).
+SQLite runs with WAL and `synchronous=FULL`: what is acknowledged survives power loss.
+"""
+
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from alembic import command
+from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import (
+    Connection,
+    CursorResult,
+    Engine,
+    Executable,
+    QueuePool,
+    create_engine,
+    event,
+    make_url,
+)
+from sqlalchemy.engine import URL
+from sqlalchemy.exc import ArgumentError, OperationalError
+
+from server.domain.errors import NotReadyError
+
+MIGRATIONS = Path(__file__).parents[2] / "migrations"
+BUSY_TIMEOUT_MS = 10_000
+CONNECTIONS = 45  # more than the 40 threads in which Starlette runs `def` routes
+Rows = Mapping[str, Any] | Sequence[Mapping[str, Any]]
+
+
+class DbSession:
+    """One transaction, handed through the services to the query modules."""
+
+    def __init__(self, connection: Connection, writer: "threading.Lock | None", *, writable: bool) -> None:
+        self.connection = connection
+        self._writer = writer  # SQLite: threads of one process queue here, fairly, instead of polling the file
+        self._writable = writable
+        self._held = False
+
+    def read(self, statement: Executable, rows: Rows | None = None) -> CursorResult[Any]:
+        return self.connection.execute(statement, rows)
+
+    def write(self, statement: Executable, rows: Rows | None = None) -> CursorResult[Any]:
+        self.hold()
+        return self.connection.execute(statement, rows)
+
+    def hold(self) -> None:
+        """Take SQLite's write lock now: what is read from here on cannot change before the commit.
+
+        PostgreSQL has no such lock; there a query module locks the row it decides on (`studies.hold`).
+        """
+        if not self._writable:
+            raise RuntimeError("a reading() transaction was asked to write")
+        if self._writer is None or self._held:
+            return
+        self._writer.acquire()
+        self._held = True
+        self.connection.exec_driver_sql("BEGIN IMMEDIATE")
+
+    def release(self) -> None:
+        if self._held and self._writer is not None:
+            self._held = False
+            self._writer.release()
+
+
+class Database:
+    """The engine of one URL.
+
+    Raises:
+        NotReadyError: the URL cannot be used.
+    """
+
+    def __init__(self, url: str) -> None:
+        self.url = parsed(url)
+        self.is_sqlite = self.url.get_backend_name() == "sqlite"
+        self.engine = engine_of(self.url)
+        self._snapshots = self.engine
+        if not self.is_sqlite:
+            self._snapshots = self.engine.execution_options(
+                isolation_level="REPEATABLE READ", postgresql_readonly=True
+            )
+        self._writer = threading.Lock() if self.is_sqlite else None
+
+    @contextmanager
+    def reading(self) -> Iterator[DbSession]:
+        with self._snapshots.connect() as connection:
+            if self.is_sqlite:
+                connection.exec_driver_sql("BEGIN")
+            yield DbSession(connection, None, writable=False)
+
+    @contextmanager
+    def writing(self) -> Iterator[DbSession]:
+        with self.engine.connect() as connection:
+            db = DbSession(connection, self._writer, writable=True)
+            try:
+                yield db
+                connection.commit()
+            except BaseException:
+                connection.rollback()  # before the lock is given to the next thread
+                raise
+            finally:
+                db.release()
+
+    def is_current(self) -> bool:
+        """Whether every migration has been run. False for an empty or missing database."""
+        if self.is_sqlite and self.url.database and not Path(self.url.database).exists():
+            return False
+        try:
+            with self.engine.connect() as connection:
+                current = MigrationContext.configure(connection).get_current_heads()
+        except OperationalError as error:
+            raise NotReadyError(f"database {self.shown_url} cannot be reached: {error.orig}") from error
+        return set(current) == set(ScriptDirectory.from_config(alembic_config()).get_heads())
+
+    def upgrade(self) -> None:
+        """Run the migrations that are missing. Creates the folder of an SQLite file."""
+        if self.is_sqlite and self.url.database:
+            Path(self.url.database).parent.mkdir(parents=True, exist_ok=True)
+        config = alembic_config()
+        try:
+            with self.engine.begin() as connection:
+                if self.is_sqlite:
+                    connection.exec_driver_sql("BEGIN IMMEDIATE")  # a migration happens whole or not at all
+                config.attributes["connection"] = connection
+                command.upgrade(config, "head")
+        except OperationalError as error:
+            raise NotReadyError(f"database {self.shown_url} cannot be reached: {error.orig}") from error
+
+    @property
+    def shown_url(self) -> str:
+        return self.url.render_as_string(hide_password=True)
+
+    def close(self) -> None:
+        self.engine.dispose()
+
+
+def parsed(url: str) -> URL:
+    try:
+        given = make_url(url)
+    except ArgumentError as error:
+        raise NotReadyError("HATLAB_DATABASE_URL is not a database URL") from error
+    if given.drivername in {"postgresql", "postgres", "postgresql+psycopg"}:
+        return given.set(drivername="postgresql+psycopg")
+    if given.drivername in {"sqlite", "sqlite+pysqlite"} and given.database not in {None, "", ":memory:"}:
+        return given
+    raise NotReadyError(
+        f"HATLAB_DATABASE_URL: use sqlite:///file or postgresql://…, not {given.drivername}://"
+    )
+
+
+def engine_of(url: URL) -> Engine:
+    engine = create_engine(url, poolclass=QueuePool, pool_size=CONNECTIONS, max_overflow=0)
+    if url.get_backend_name() == "sqlite":
+        event.listen(engine, "connect", prepare_sqlite)
+    return engine
+
+
+def prepare_sqlite(connection: Any, _record: object) -> None:
+    connection.isolation_level = None  # the driver begins nothing on its own; hold() and reading() do
+    for pragma in (
+        f"busy_timeout={BUSY_TIMEOUT_MS}",
+        "journal_mode=WAL",
+        "synchronous=FULL",
+        "foreign_keys=ON",
+    ):
+        connection.execute(f"PRAGMA {pragma}")
+
+
+def alembic_config() -> Config:
+    config = Config()
+    config.set_main_option("script_location", str(MIGRATIONS))
+    return config

@@ -1,0 +1,79 @@
+"""What an export reads: one study's people a page at a time, with their trials and events, each in the order of its key.
+
+Keyset pages keep memory constant and need no sort over the whole study. Nothing here touches `identity`.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from sqlalchemy import select
+
+from server.storage.database import DbSession
+from server.storage.tables import allocation, consent, event, participant, study, study_version, trial
+
+Row = Mapping[str, Any]
+ROWS_A_FETCH = 2_000
+
+
+def study_row(db: DbSession, slug: str) -> Row | None:
+    return (
+        db.read(select(study.c.id, study.c.slug, study.c.title).where(study.c.slug == slug))
+        .mappings()
+        .first()
+    )
+
+
+def version_rows(db: DbSession, study_id: int) -> list[Row]:
+    """Every launched version, oldest first, with its definition as text."""
+    columns = (
+        study_version.c.number,
+        study_version.c.sha256,
+        study_version.c.launched_utc,
+        study_version.c.definition,
+    )
+    statement = select(*columns).where(study_version.c.study_id == study_id).order_by(study_version.c.number)
+    return list(db.read(statement).mappings())
+
+
+def participant_page(db: DbSession, study_id: int, modes: Sequence[str], after: str, limit: int) -> list[Row]:
+    """The next people of a study, by id, with their version, consent and allocation."""
+    statement = (
+        select(
+            participant,
+            study_version.c.number.label("study_version"),
+            consent.c.version.label("consent_version"),
+            consent.c.text_sha256.label("consent_text_sha256"),
+            allocation.c.probability.label("allocation_probability"),
+            allocation.c.seed.label("allocation_seed"),
+            allocation.c.allocated_utc,
+        )
+        .join(study_version, study_version.c.id == participant.c.study_version_id)
+        .outerjoin(consent, consent.c.participant_id == participant.c.id)
+        .outerjoin(allocation, allocation.c.participant_id == participant.c.id)
+        .where(participant.c.study_id == study_id, participant.c.mode.in_(modes), participant.c.id > after)
+        .order_by(participant.c.id)
+        .limit(limit)
+    )
+    return list(db.read(statement).mappings())
+
+
+def trial_rows(db: DbSession, participants: Sequence[str], phases: Sequence[str]) -> list[Row]:
+    """The trials of these people, by id."""
+    statement = (
+        select(trial)
+        .where(trial.c.participant_id.in_(participants), trial.c.phase.in_(phases))
+        .order_by(trial.c.id)
+    )
+    return list(db.read(statement).mappings())
+
+
+def event_rows(db: DbSession, participants: Sequence[str], phases: Sequence[str]) -> Iterator[Row]:
+    """The events of these trials, by trial and seq, streamed."""
+    statement = (
+        select(event.c.trial_id, event.c.seq, event.c.body, event.c.stored_utc)
+        .join(trial, trial.c.id == event.c.trial_id)
+        .where(trial.c.participant_id.in_(participants), trial.c.phase.in_(phases))
+        .order_by(event.c.trial_id, event.c.seq)
+        .execution_options(yield_per=ROWS_A_FETCH)
+    )
+    yield from db.read(statement).mappings()
