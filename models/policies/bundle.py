@@ -232,6 +232,8 @@ def _check_types(data: dict[str, Any]) -> None:
                 raise BundleError(f"{MANIFEST}: {name} is {data[name]!r}, which is of the wrong type")
     if not NAME.fullmatch(data["name"]):
         raise BundleError(f"{MANIFEST}: name {data['name']!r} is not of the form task_folder/name-1")
+    if not 0 < data["budget"] <= 1:
+        raise BundleError(f"{MANIFEST}: budget is {data['budget']}, a share above 0 and at most 1 is needed")
     if not all(type(value) is int and value >= 0 for value in data["sizes"].values()):
         raise BundleError(f"{MANIFEST}: sizes must be whole numbers of 0 or more")
 
@@ -253,7 +255,7 @@ def _check_task(manifest: Manifest) -> None:
     try:
         env = registry.make(manifest.task)
     except registry.UnknownTaskError as error:
-        raise BundleError(f"{MANIFEST}: {error.args[0]}") from None
+        raise BundleError(f"{MANIFEST}: {error}") from None
     if manifest.task_version != env.version:
         raise BundleError(
             f"{MANIFEST}: trained for version {manifest.task_version} of {manifest.task}, "
