@@ -12,8 +12,8 @@ class Arrival:
     """What an entry link says about a person.
 
     `external_id` is the marketplace's name for the person (None: direct link, nobody is named);
-    `submission_id` its name for this one sitting; `parameters` all that was recognised, as it came; a `preview`
-    must not be stored.
+    `submission_id` its name for this one sitting; `parameters` all that was recognised, as it came;
+    a `preview` must not be stored.
     """
 
     marketplace: Marketplace

@@ -10,15 +10,21 @@ from server.recruitment.arrival import Arrival, ExitLink
 
 PARAMETERS = ("PROLIFIC_PID", "STUDY_ID", "SESSION_ID")
 COMPLETE = "https://app.prolific.com/submissions/complete"
+PLACEHOLDER = "{{%"
 PLACEHOLDERS = "PROLIFIC_PID={{%PROLIFIC_PID%}}&STUDY_ID={{%STUDY_ID%}}&SESSION_ID={{%SESSION_ID%}}"
 
 
 def recognise(query: Mapping[str, str]) -> Arrival | None:
-    """The arrival, where the link names a Prolific participant."""
+    """The arrival, where the link names a Prolific participant.
+
+    A link whose placeholders nobody filled in was opened by hand: a preview.
+    """
     person = query.get("PROLIFIC_PID", "")
     if not person:
         return None
     found = {name: query[name] for name in PARAMETERS if query.get(name)}
+    if PLACEHOLDER in person:
+        return Arrival("prolific", preview=True, parameters=found)
     return Arrival("prolific", person, query.get("SESSION_ID") or None, parameters=found)
 
 

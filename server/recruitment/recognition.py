@@ -1,20 +1,19 @@
 """Which marketplace an entry link comes from."""
 
+import re
 from collections.abc import Mapping
 
 from server.recruitment import direct, mturk, prolific
 from server.recruitment.arrival import Arrival, ExitLink
 
 PARAMETERS = (*prolific.PARAMETERS, *mturk.PARAMETERS)
-PARAMETER_MAX = 200  # characters; longer ones are no marketplace's
+VALUE = re.compile(r"[!-~]{1,200}")  # printable ASCII; no marketplace sends anything else
 
 
 def recognise(query: Mapping[str, str]) -> Arrival:
     """The arrival of the first marketplace whose parameters are there, else a direct one."""
-    short = {
-        name: value for name, value in query.items() if name in PARAMETERS and len(value) <= PARAMETER_MAX
-    }
-    return prolific.recognise(short) or mturk.recognise(short) or direct.recognise()
+    known = {name: query[name] for name in PARAMETERS if VALUE.fullmatch(query.get(name, ""))}
+    return prolific.recognise(known) or mturk.recognise(known) or direct.recognise()
 
 
 def exit_link(

@@ -31,13 +31,17 @@ class Action:
 class ConsentPage:
     """The entry page.
 
-    The form posts to `action`: the hidden `identifiers`; the button's `agree` = "yes" or "no"; the tick `read` = "yes";
-    and what the browser says about itself: `device`, `browser`, `viewport` (empty without scripts).
+    The form posts to `action`: the hidden `identifiers`; the button's `agree` = "yes" or "no"; the tick
+    `read` = "yes"; and what the browser says about itself: `device` (desktop, tablet, phone), `browser`,
+    `viewport` ("1280x720"), all three empty without scripts.
     """
 
     template: ClassVar[str] = "participant/consent.html"
     study_title: str
+    welcome: str
     paragraphs: tuple[str, ...]
+    agree_text: str
+    contact: str
     facts: tuple[tuple[str, str], ...]
     identifiers: Mapping[str, str]
     action: str
@@ -85,8 +89,8 @@ class PlayPage:
 class CompletePage:
     """The code and the way back.
 
-    With `fields` the way back is a form that posts them to `url` (MTurk), without it is a link (Prolific); without
-    `url` the code is all there is (direct).
+    With `fields` the way back is a form that posts them to `url` (MTurk), without it is a link (Prolific);
+    without `url` the code is all there is (direct).
     """
 
     template: ClassVar[str] = "participant/complete.html"
@@ -96,6 +100,7 @@ class CompletePage:
     url: str | None
     rounds_stored: int
     rounds: int
+    text: str
     fields: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -20,7 +20,8 @@ BARE_POLICY = "default-src 'none'; frame-ancestors 'none'; base-uri 'none'; form
 def policy(import_map_sha256: str, *, frames: Iterable[str] = (), forms: Iterable[str] = ()) -> str:
     """The Content-Security-Policy of a page: scripts and styles only from this server's files.
 
-    The one inline script is the import map, allowed by its hash. `frames` may embed the page; `forms` may be posted to.
+    The one inline script is the import map, allowed by its hash. `frames` may embed the page; `forms` may be
+    posted to.
     """
     ancestors = " ".join(frames) or "'none'"
     targets = " ".join(("'self'", *forms))

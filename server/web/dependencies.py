@@ -1,0 +1,26 @@
+"""What routes ask for, as annotated dependencies. All `async def`: a `def` one would cost a thread hop each.
+
+Transactions are opened inside the routes (`with lab.database.writing() as db`): the block has ended, and the commit is
+durable, before the route returns its response. A `yield` dependency would by default commit after it.
+"""
+
+from typing import Annotated
+
+from fastapi import Depends, Request
+
+from server.services.lab import Lab
+
+
+async def current_lab(request: Request) -> Lab:
+    lab: Lab = request.app.state.lab
+    return lab
+
+
+async def form_fields(request: Request) -> dict[str, str]:
+    """The text fields of a posted form; of a repeated one the last."""
+    form = await request.form(max_files=0, max_fields=200)
+    return {name: value for name, value in form.multi_items() if isinstance(value, str)}
+
+
+CurrentLab = Annotated[Lab, Depends(current_lab)]
+Fields = Annotated[dict[str, str], Depends(form_fields)]
