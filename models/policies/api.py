@@ -65,7 +65,10 @@ class Policy(Protocol):
         ...
 
     def speak(
-        self, hidden: NDArray[np.float32], observation: NDArray[np.float32], sampled: RandomDraws | None = None
+        self,
+        hidden: NDArray[np.float32],
+        observation: NDArray[np.float32],
+        sampled: RandomDraws | None = None,
     ) -> Speech:
         """From memory (R, H) and observation (R, O) to what is said."""
         ...

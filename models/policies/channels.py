@@ -12,7 +12,9 @@ from typing import NamedTuple
 import torch
 from torch import Tensor, nn
 
-COMMITMENT = 0.25  # weight of the pull on the speaker towards its prototype (van den Oord et al., section 3.2)
+COMMITMENT = (
+    0.25  # weight of the pull on the speaker towards its prototype (van den Oord et al., section 3.2)
+)
 CHANNELS = ("none", "continuous", "prototype", "one-hot")
 
 

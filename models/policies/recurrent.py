@@ -97,9 +97,7 @@ class RecurrentNet(nn.Module):
         self.second = nn.LSTMCell(hidden + a.message, hidden)
         self.match_inbox = nn.Linear(a.message, hidden)
         self.match_own = nn.Linear(hidden, hidden)
-        self.head = nn.Sequential(
-            nn.Linear(self.features, hidden), nn.ReLU(), nn.Linear(hidden, a.actions)
-        )
+        self.head = nn.Sequential(nn.Linear(self.features, hidden), nn.ReLU(), nn.Linear(hidden, a.actions))
 
     @property
     def features(self) -> int:
@@ -130,7 +128,11 @@ class RecurrentNet(nn.Module):
             raw = torch.tanh(raw)
         token, message, loss = self._utter(raw, draws, discrete)
         logit = self._gate_logit(source)
-        gate = torch.ones_like(logit) if self.gate is None else gate_of(logit, None if draws is None else draws[:, 1])
+        gate = (
+            torch.ones_like(logit)
+            if self.gate is None
+            else gate_of(logit, None if draws is None else draws[:, 1])
+        )
         if self.architecture.channel == "none":
             gate = torch.zeros_like(logit)
         memory = torch.cat((hidden1, cell1, hidden2, cell2, encoded), 1)
@@ -191,7 +193,10 @@ class RecurrentPolicy:
         return {name: tensor.detach().contiguous() for name, tensor in self.net.state_dict().items()}
 
     def speak(
-        self, hidden: NDArray[np.float32], observation: NDArray[np.float32], sampled: RandomDraws | None = None
+        self,
+        hidden: NDArray[np.float32],
+        observation: NDArray[np.float32],
+        sampled: RandomDraws | None = None,
     ) -> Speech:
         draws = None
         if sampled is not None:
@@ -200,7 +205,7 @@ class RecurrentPolicy:
             said = self.net.speak(torch.from_numpy(hidden), torch.from_numpy(observation), draws)
         return Speech(
             said.token.numpy().astype(np.int32),
-            said.gate.numpy() >= 0.5,  # noqa: PLR2004
+            said.gate.numpy() >= 0.5,
             said.message.numpy(),
             said.memory.numpy(),
         )

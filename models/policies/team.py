@@ -65,7 +65,9 @@ class Team:
         sent = talk.messages * talk.gates[:, :, None]
         others = sent.sum(1, keepdims=True) - sent
         count = talk.gates.sum(1, keepdims=True) - talk.gates  # (B, N)
-        return np.where(count[:, :, None] > 0, others / np.maximum(count, 1)[:, :, None], 0).astype(np.float32)
+        return np.where(count[:, :, None] > 0, others / np.maximum(count, 1)[:, :, None], 0).astype(
+            np.float32
+        )
 
     def act(self, state: Any, memory: Memory, talk: Talk) -> tuple[NDArray[np.int32], Memory]:
         """Every living seat hears and decides; actions (B, N), 0 for empty seats."""
