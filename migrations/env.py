@@ -1,4 +1,7 @@
-"""Alembic's entry. `Database.upgrade` passes its connection; on the command line HATLAB_DATABASE_URL names the database."""
+"""Alembic's entry.
+
+`Database.upgrade` passes its connection; on the command line HATLAB_DATABASE_URL names the database.
+"""
 
 from alembic import context
 from sqlalchemy import Connection
@@ -9,7 +12,9 @@ from server.storage.tables import metadata
 
 
 def migrate(connection: Connection) -> None:
-    context.configure(connection=connection, target_metadata=metadata, render_as_batch=True, compare_type=True)
+    context.configure(
+        connection=connection, target_metadata=metadata, render_as_batch=True, compare_type=True
+    )
     with context.begin_transaction():
         context.run_migrations()
 

@@ -1,4 +1,7 @@
-"""The settings of one server, read once from the environment (`HATLAB_…`). Nothing else reads the environment."""
+"""The settings of one server, read once from the environment (`HATLAB_…`).
+
+Nothing else reads the environment.
+"""
 
 from pathlib import Path
 
@@ -16,7 +19,10 @@ class Settings(BaseSettings):
     admin_password: SecretStr | None = None
     """Password of the first admin. Unset: `hatlab init` draws one and prints it once."""
     secret_key: SecretStr | None = None
-    """Root of participant keys and signatures. Unset: `hatlab init` draws one and keeps it in the database."""
+    """Root of participant keys and signatures.
+
+    Unset: `hatlab init` draws one and keeps it in the database.
+    """
     public_url: str = "http://127.0.0.1:8000"
     """Where browsers reach this server; participant links begin with it."""
     bundles: Path = PACKAGED_BUNDLES

@@ -1,4 +1,6 @@
-"""What can go wrong, as one tree. Every error says in one line what happened and what to do; `status` is its HTTP status.
+"""What can go wrong, as one tree.
+
+Every error says in one line what happened and what to do; `status` is its HTTP status.
 
 HatlabError
 ├── NotFoundError 404      no such study, session or round

@@ -1,7 +1,7 @@
-"""What a study is: its definition as a frozen value, read from TOML, JSON or a form, with one message per wrong field.
+"""What a study is: its definition as a frozen value, with one message per wrong field.
 
-A launched version is this value in canonical JSON and its sha256. Whether the named bundles exist and fit is judged
-against `Offer`s, plain facts about the bundles that the server has loaded.
+It is read from TOML, JSON or a form. A launched version is this value in canonical JSON and its sha256.
+Whether the named bundles exist and fit is judged against `Offer`s, plain facts about the loaded bundles.
 """
 
 from collections.abc import Iterator, Mapping
@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationError
 
+from models.envs import registry
 from server.domain import canonical
 from server.domain.errors import DefinitionError
 
@@ -30,7 +31,6 @@ ROLE_ORDERS: dict[Task, tuple[str, ...]] = {
     "parent_child": ("parent-child", "child-parent"),
     "traffic_junction": ("driver",),
 }
-PARENT_CHILD_STEPS_MAX = 20  # the task itself ends there
 
 Slug = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,47}$")]
 Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
@@ -59,6 +59,8 @@ class Texts(Part):
     consent: tuple[Paragraph, ...] = Field(min_length=1, max_length=40)
     consent_version: Line
     agree: Line
+    instructions: tuple[Paragraph, ...] = Field(default=(), max_length=10)
+    """Shown above the built-in instructions of every block; usually empty."""
     declined: Paragraph
     complete: Paragraph
 
@@ -155,8 +157,8 @@ def contradictions(study: StudyDefinition) -> Iterator[tuple[str, str]]:
         yield "environment", f"{study.environment} is not a world of the task {study.task}"
     if (study.task == "parent_child") != bool(study.panel_bundle):
         yield "panel_bundle", "Parent & Lost Child needs one, Traffic Junction has none"
-    if study.task == "parent_child" and study.step_limit > PARENT_CHILD_STEPS_MAX:
-        yield "step_limit", f"at most {PARENT_CHILD_STEPS_MAX} in Parent & Lost Child"
+    if study.step_limit > (steps_max := registry.make(study.environment).steps_max):
+        yield "step_limit", f"at most {steps_max} in {study.environment}: an episode ends there"
     if study.completion_url and "{code}" not in study.completion_url:
         yield "completion_url", "must contain {code}"
     seen: set[str] = set()

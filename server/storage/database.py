@@ -1,9 +1,10 @@
 """One database, SQLite or PostgreSQL, and the transactions on it.
 
-`reading()` sees one snapshot. `writing()` commits when its block ends without an error, and nobody else commits. On SQLite
-a writing transaction takes the one write lock at its first write (`BEGIN IMMEDIATE`) and not before, so that a decision can
-be computed without keeping others waiting; whoever must decide on what was read takes the lock first (`DbSession.hold`).
-SQLite runs with WAL and `synchronous=FULL`: what is acknowledged survives power loss.
+`reading()` sees one snapshot. `writing()` commits when its block ends without an error, and nobody else
+commits. On SQLite a writing transaction takes the one write lock at its first write (`BEGIN IMMEDIATE`) and
+not before, so that a decision can be computed without keeping others waiting; whoever must decide on what was
+read takes the lock first (`DbSession.hold`). SQLite runs with WAL and `synchronous=FULL`: what is
+acknowledged survives power loss.
 """
 
 import threading
@@ -42,7 +43,9 @@ class DbSession:
 
     def __init__(self, connection: Connection, writer: "threading.Lock | None", *, writable: bool) -> None:
         self.connection = connection
-        self._writer = writer  # SQLite: threads of one process queue here, fairly, instead of polling the file
+        self._writer = (
+            writer  # SQLite: threads of one process queue here, fairly, instead of polling the file
+        )
         self._writable = writable
         self._held = False
 

@@ -1,7 +1,7 @@
 """The tables. Times are UTC ISO 8601 text with milliseconds and a Z; JSON is canonical text.
 
-Only trials are event-sourced: `event` is the truth, and every column of `trial` after `number` can be computed from it.
-Marketplace ids stand in `identity` and nowhere else.
+Only trials are event-sourced: `event` is the truth, and every column of `trial` after `number` can be
+computed from it. Marketplace ids stand in `identity` and nowhere else.
 """
 
 from sqlalchemy import (

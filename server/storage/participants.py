@@ -1,0 +1,118 @@
+"""Rows of participants. No marketplace id stands here; see `enrolments`."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from sqlalchemy import bindparam, func, insert, or_, select, update
+
+from server.storage.database import DbSession
+from server.storage.tables import participant
+
+
+class ParticipantRow(NamedTuple):
+    id: str
+    study_id: int
+    study_version_id: int
+    mode: str
+    key_sha256: str
+    marketplace: str
+    arm: str
+    role_order: str
+    token_permutation: str
+    number_permutation: str
+    device: str
+    browser: str
+    viewport: str
+    status: str
+    page: str
+    consented_utc: str
+    last_seen_utc: str
+    finished_utc: str | None
+    completion_code: str | None
+
+
+class CellCount(NamedTuple):
+    arm: str
+    role_order: str
+    device: str
+    people: int
+
+
+PARTICIPANT = select(participant)
+BY_KEY = PARTICIPANT.where(participant.c.key_sha256 == bindparam("key_sha256"))
+SEEN = (
+    update(participant)
+    .where(participant.c.id == bindparam("participant_id"))
+    .values(last_seen_utc=bindparam("now_utc"))
+)
+
+
+def add(db: DbSession, row: ParticipantRow) -> None:
+    db.write(insert(participant), row._asdict())
+
+
+def by_key(db: DbSession, key_sha256: str) -> ParticipantRow | None:
+    row = db.read(BY_KEY, {"key_sha256": key_sha256}).one_or_none()
+    return ParticipantRow._make(row) if row else None
+
+
+def by_id(db: DbSession, participant_id: str) -> ParticipantRow:
+    return ParticipantRow._make(db.read(PARTICIPANT.where(participant.c.id == participant_id)).one())
+
+
+def hold(db: DbSession, participant_id: str) -> ParticipantRow:
+    """The participant, locked until the transaction ends."""
+    db.hold()
+    statement = PARTICIPANT.where(participant.c.id == participant_id).with_for_update()
+    return ParticipantRow._make(db.read(statement).one())
+
+
+def seen(db: DbSession, participant_id: str, now_utc: str) -> None:
+    db.write(SEEN, {"participant_id": participant_id, "now_utc": now_utc})
+
+
+def turn_page(db: DbSession, participant_id: str, page: str, now_utc: str) -> None:
+    db.write(
+        update(participant).where(participant.c.id == participant_id).values(page=page, last_seen_utc=now_utc)
+    )
+
+
+def finish(db: DbSession, participant_id: str, page: str, completion_code: str, now_utc: str) -> None:
+    db.write(
+        update(participant)
+        .where(participant.c.id == participant_id)
+        .values(
+            page=page,
+            status="finished",
+            completion_code=completion_code,
+            finished_utc=now_utc,
+            last_seen_utc=now_utc,
+        )
+    )
+
+
+def holding_places(db: DbSession, study_id: int, mode: str, seen_since_utc: str) -> list[CellCount]:
+    """How many people hold a place, by arm, role order and device class: finished, or seen since then."""
+    cell = (participant.c.arm, participant.c.role_order, participant.c.device)
+    statement = (
+        select(*cell, func.count())
+        .where(participant.c.study_id == study_id, participant.c.mode == mode)
+        .where(
+            or_(
+                participant.c.status == "finished",
+                (participant.c.status == "active") & (participant.c.last_seen_utc >= seen_since_utc),
+            )
+        )
+        .group_by(*cell)
+        .order_by(*cell)
+    )
+    return [CellCount._make(row) for row in db.read(statement)]
+
+
+def stream(db: DbSession, study_id: int | None = None) -> Iterator[ParticipantRow]:
+    """Every participant, of one study or of all, by id, with constant memory."""
+    statement = PARTICIPANT.order_by(participant.c.id).execution_options(yield_per=500)
+    if study_id is not None:
+        statement = statement.where(participant.c.study_id == study_id)
+    for row in db.read(statement):
+        yield ParticipantRow._make(row)
