@@ -1,7 +1,7 @@
 """What routes ask for, as annotated dependencies. All `async def`: a `def` one would cost a thread hop each.
 
-Transactions are opened inside the routes (`with lab.database.writing() as db`): the block has ended, and the commit is
-durable, before the route returns its response. A `yield` dependency would by default commit after it.
+Transactions are opened inside the routes (`with lab.database.writing() as db`): the block has ended, and the
+commit is durable, before the route returns its response. A `yield` dependency commits after it by default.
 """
 
 from typing import Annotated

@@ -1,0 +1,64 @@
+"""The one composition root: settings, database and bundles in, an ASGI application out."""
+
+import sys
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import structlog
+from fastapi import FastAPI
+from fastapi.middleware import Middleware
+
+from server.services.lab import Lab
+from server.settings import Settings
+from server.web import admin, errors, health, participant, play_api
+from server.web.security import BodyLimit, SecurityHeaders
+from server.web.static import VersionedFiles
+
+NO_TELEMETRY = {"tracing": False, "metrics": False, "logs": False}  # nobody is watched beyond the log
+
+
+def create_app(lab: Lab) -> FastAPI:
+    """The server over an opened lab, which it closes at the end."""
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        yield
+        lab.close()
+
+    app = FastAPI(
+        title="hatlab",
+        docs_url=None,
+        redoc_url=None,
+        openapi_url=None,
+        telemetry=NO_TELEMETRY,
+        lifespan=lifespan,
+        middleware=[
+            Middleware(SecurityHeaders, behind_https=lab.settings.behind_https),
+            Middleware(errors.Incidents),
+            Middleware(BodyLimit, body_max_bytes=lab.settings.body_max_bytes),
+        ],
+    )
+    app.state.lab = lab
+    errors.install(app)
+    for router in (play_api.router, participant.router, health.router, admin.router):
+        app.include_router(router)
+    app.mount("/static", VersionedFiles())
+    return app
+
+
+def from_environment() -> FastAPI:
+    """The application of one worker: what `uvicorn` calls as a factory."""
+    log_as_json()
+    return create_app(Lab.open(Settings()))
+
+
+def log_as_json() -> None:
+    """One JSON object a line on stderr."""
+    structlog.configure(
+        processors=[
+            structlog.processors.add_log_level,
+            structlog.processors.TimeStamper(fmt="iso", utc=True, key="at"),
+            structlog.processors.JSONRenderer(sort_keys=True),
+        ],
+        logger_factory=structlog.WriteLoggerFactory(file=sys.stderr),
+    )
