@@ -4,11 +4,11 @@
     observations, infos = env.reset(seed=7)
 
 One adapter is one episode at a time (B = 1). Seats keep their names for the whole episode: a slot of Traffic
-Junction without a car stays among the agents, observes zeros and is paid nothing; `infos[agent]["alive"]` says
-which are occupied. Messages are not part of the environment: agents that talk do so in their learner.
+Junction without a car stays among the agents, observes zeros and is paid nothing; `infos[agent]["alive"]`
+says which are occupied. Messages are not part of the environment: agents that talk do so in their learner.
 
-`reset(seed=s)` plays the world of seed s, as everywhere in hatlab; later resets without a seed go on from it in
-a fixed order.
+`reset(seed=s)` plays the world of seed s, as everywhere in hatlab; later resets without a seed go on from it
+in a fixed order.
 """
 
 from dataclasses import replace

@@ -15,12 +15,13 @@ from models.envs.api import Ints
 from models.envs.traffic_junction import BRAKE, GAS, TrafficJunction, TrafficState
 
 _OUT = -1
+"""No cell: `next_cell` of a car that would leave."""
 
 
 def right_of_way(env: TrafficJunction, state: TrafficState) -> Ints:
     """Return the actions (B, N) that the rule gives; BRAKE for empty slots."""
     here = env.cell_of(state)
-    ahead = _next_cell(env, state)
+    ahead = env.next_cell(state)
     first = _ranks_before(env, state, here)  # (B, N, N): the second car ranks before the first
     same = (ahead[:, :, None] == ahead[:, None, :]) & (ahead[:, :, None] != _OUT)
     yields_to = same & first
@@ -33,14 +34,6 @@ def right_of_way(env: TrafficJunction, state: TrafficState) -> Ints:
         if (still == moving).all():
             return np.where(moving, GAS, BRAKE).astype(np.int32)
         moving = still
-
-
-def _next_cell(env: TrafficJunction, state: TrafficState) -> Ints:
-    """Return the cell that gas would lead to (B, N), -1 out of the grid or for empty slots."""
-    position = state.position + 1
-    leads_on = state.alive & (position < env.route_length[state.route])
-    last = env.route_cells.shape[1] - 1
-    return np.where(leads_on, env.route_cells[state.route, np.minimum(position, last)], np.int32(_OUT))
 
 
 def _ranks_before(env: TrafficJunction, state: TrafficState, here: Ints) -> Ints:

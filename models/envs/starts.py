@@ -62,7 +62,12 @@ def human_start(env: TrafficJunction, seeds: Seeds, arrival: float = ARRIVAL) ->
     """Return the starts of human trials for these situation seeds (B,).
 
     Each depends on its own seed only. `arrival` is the probability per entrance and step from the start on.
+
+    Raises:
+        ValueError: the environment has too few slots for so many cars and a participant.
     """
+    if env.agents <= CARS[1]:
+        raise ValueError(f"a human trial needs {CARS[1] + 1} slots, {env.name} has {env.agents}")
     seeds = np.asarray(seeds, np.uint64)
     attempt, length = _search(env, seeds)
     draw = _draw(env, seeds, attempt)

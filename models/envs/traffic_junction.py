@@ -169,6 +169,13 @@ class TrafficJunction:
     def success(self, state: TrafficState) -> Bools:
         return ~state.crashed
 
+    def next_cell(self, state: TrafficState) -> Ints:
+        """Return the cell that gas would lead to (B, N); -1 where it leads out, and for empty slots."""
+        position = state.position + 1
+        stays = state.alive & (position < self.route_length[state.route])
+        last = self.route_cells.shape[1] - 1
+        return np.where(stays, self.route_cells[state.route, np.minimum(position, last)], np.int32(-1))
+
     def completed(self, state: TrafficState) -> Bools:
         """Return whose car arrived at the end of its route in the last step (B, N)."""
         return state.completed

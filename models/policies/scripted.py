@@ -18,7 +18,7 @@ from models.envs.right_of_way import right_of_way
 from models.envs.traffic_junction import GAS, TrafficJunction
 
 RANDOM_ACTIONS = 16
-"""Stream of the random policy (plus its own seed, shifted past all streams): index is the seat."""
+"""Stream over the random policy's own seed; the word is its stream in each world, where index is the seat."""
 
 
 class Scripted(Protocol):
@@ -66,7 +66,7 @@ class Random:
     name = "scripted:random"
 
     def __init__(self, seed: int = 0) -> None:
-        self._stream = RANDOM_ACTIONS + (seed << 8)
+        self._stream = rng.word(seed, RANDOM_ACTIONS, 0, 0)
 
     def actions(self, env: Environment[Any], state: Any) -> Ints:
         draws = rng.words(state.seed[:, None], self._stream, state.t[:, None], np.arange(env.agents))
