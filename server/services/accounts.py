@@ -1,7 +1,8 @@
 """Accounts of experimenters: passwords, signing in with a brake on guessing, sessions.
 
-Attempts are rows, so that all workers count the same. An attempt is stored as failed *before* the password is looked
-at, so that many guesses at once cannot slip past the limit, and no transaction is open while the password is hashed.
+Attempts are rows, so that all workers count the same. An attempt is stored as failed *before* the password is
+looked at, so that many guesses at once cannot slip past the limit, and no transaction is open while the
+password is hashed.
 """
 
 import hashlib
@@ -26,8 +27,8 @@ USERNAME_MAX = 64
 SESSION = timedelta(hours=12)
 WINDOW = timedelta(minutes=15)
 KEPT = timedelta(days=30)
-# Failed attempts in the window: a person mistypes; a source may hold several people; a username may be guessed
-# from many sources, where a low limit would let strangers lock its owner out.
+# Failed attempts in the window: a person mistypes; a source may hold several people; a username may be
+# guessed from many sources, where a low limit would let strangers lock its owner out.
 PAIR_MAX, SOURCE_MAX, USERNAME_MAX_FAILURES = 5, 20, 50
 
 
@@ -71,8 +72,8 @@ def nobody() -> str:
 def ensure_admin(db: DbSession, lab: Lab, username: str = OWNER) -> str | None:
     """See to it that `username` can sign in. Returns a password that was drawn, to be shown once; else None.
 
-    HATLAB_ADMIN_PASSWORD, where it is set, becomes the password, also of an account that exists (the way back in for
-    somebody who lost it); its sessions end then.
+    HATLAB_ADMIN_PASSWORD, where it is set, becomes the password, also of an account that exists (the way back
+    in for somebody who lost it); its sessions end then.
     """
     account = admins.by_name(db, username)
     wanted = lab.settings.admin_password
@@ -136,7 +137,8 @@ def login(lab: Lab, username: str, password: str, source: str) -> SignedIn | Wro
 def admitted(lab: Lab, source: str, username: str) -> int | Wait:
     """The id of the stored attempt, or how long to wait.
 
-    Counted again after the commit: whoever commits last sees all, on PostgreSQL too, where transactions overlap.
+    Counted again after the commit: whoever commits last sees all, on PostgreSQL too, where transactions
+    overlap.
     """
     now = lab.now()
     with lab.database.writing() as db:
@@ -175,9 +177,7 @@ def new_session(db: DbSession, lab: Lab, admin_id: int) -> SignedIn:
     now = lab.now()
     key = secrets.token_urlsafe(32)
     admins.end_expired_sessions(db, utc(now))
-    admins.add_session(
-        db, hashed(key), admin_id, secrets.token_urlsafe(32), utc(now), utc(now + SESSION)
-    )
+    admins.add_session(db, hashed(key), admin_id, secrets.token_urlsafe(32), utc(now), utc(now + SESSION))
     return SignedIn(key, int(SESSION.total_seconds()))
 
 

@@ -1,6 +1,6 @@
 """Rows of experimenters: accounts, their sessions, and attempts to sign in."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from sqlalchemy import delete, func, insert, select, update
 
@@ -8,15 +8,13 @@ from server.storage.database import DbSession
 from server.storage.tables import admin, admin_session, login_attempt
 
 
-@dataclass(frozen=True, slots=True)
-class Account:
+class Account(NamedTuple):
     id: int
     username: str
     password_hash: str
 
 
-@dataclass(frozen=True, slots=True)
-class StoredSession:
+class StoredSession(NamedTuple):
     username: str
     csrf: str
     expires_utc: str
@@ -26,7 +24,7 @@ def by_name(db: DbSession, username: str) -> Account | None:
     row = db.read(
         select(admin.c.id, admin.c.username, admin.c.password_hash).where(admin.c.username == username)
     ).one_or_none()
-    return Account(*row) if row else None
+    return Account._make(row) if row else None
 
 
 def add(db: DbSession, username: str, password_hash: str) -> None:
@@ -58,7 +56,7 @@ def session(db: DbSession, key_sha256: str) -> StoredSession | None:
         .join(admin, admin.c.id == admin_session.c.admin_id)
         .where(admin_session.c.key_sha256 == key_sha256)
     ).one_or_none()
-    return StoredSession(*row) if row else None
+    return StoredSession._make(row) if row else None
 
 
 def end_session(db: DbSession, key_sha256: str) -> None:

@@ -1,0 +1,234 @@
+"""What the admin templates get: one frozen dataclass a page, as in pages.py. Texts and numbers, no rows."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from server.domain.study import StudyDefinition
+from server.services.monitor import ArmCount, ModeCounts, PersonLine
+from server.services.studies import Blank
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What surrounds every admin page: who is signed in, where they are, the secret of their forms."""
+
+    username: str
+    csrf: str
+    section: str
+    studies: int
+    agents: int
+
+
+@dataclass(frozen=True, slots=True)
+class LoginPage:
+    template: ClassVar[str] = "admin/login.html"
+    csrf: str
+    next_url: str
+    username: str = ""
+    error: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StudyLine:
+    """One row of the list."""
+
+    slug: str
+    title: str
+    task: str
+    status: str
+    mode: str
+    version: str
+    arms: int
+    places: int
+    finished: int
+    active: int
+    abandoned: int
+    others: str
+    last_activity: str
+    last_activity_utc: str
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """One choice above a table."""
+
+    label: str
+    url: str
+    chosen: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StudiesPage:
+    template: ClassVar[str] = "admin/studies.html"
+    frame: Frame
+    lines: tuple[StudyLine, ...]
+    filters: tuple[Filter, ...]
+    active: int
+    finished_live: int
+    places_live: int
+    finished_test: int
+    bundle_errors: int
+    notice: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """Values and messages of a form, by the path of the field (`arms.2.budget`)."""
+
+    values: Mapping[str, str] = field(default_factory=dict)
+    errors: Mapping[str, str] = field(default_factory=dict)
+
+    def value(self, path: str) -> str:
+        return self.values.get(path, "")
+
+
+@dataclass(frozen=True, slots=True)
+class NewStudyPage:
+    template: ClassVar[str] = "admin/new.html"
+    frame: Frame
+    blanks: tuple[Blank, ...]
+    studies: tuple[tuple[str, str], ...]
+    form: Form
+
+
+@dataclass(frozen=True, slots=True)
+class StudyHead:
+    """The head of every page of one study."""
+
+    slug: str
+    title: str
+    status: str
+    mode: str
+    tab: str
+    version: int | None
+    sha256: str
+    launched: str
+    has_draft: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BundleChoice:
+    """A loaded agent that fits the task of the study."""
+
+    name: str
+    channel: str
+    budget: str
+    tokens: int
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """One line of the summary: where it leads, how the field is called, what is wrong."""
+
+    path: str
+    label: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of what a participant goes through."""
+
+    name: str
+    amount: str
+
+
+@dataclass(frozen=True, slots=True)
+class EntryLink:
+    """A participant link with the placeholders of a marketplace."""
+
+    name: str
+    label: str
+    url: str
+    hint: str
+
+
+@dataclass(frozen=True, slots=True)
+class BuildPage:
+    template: ClassVar[str] = "admin/build.html"
+    frame: Frame
+    head: StudyHead
+    task: str
+    form: Form
+    arms: tuple[int, ...]
+    bundles: tuple[BundleChoice, ...]
+    communications: tuple[tuple[str, str], ...]
+    mistakes: tuple[Mistake, ...]
+    wrong_sections: frozenset[str]
+    base: str
+    steps: tuple[Step, ...]
+    places: str
+    links: tuple[EntryLink, ...]
+    saved: bool
+    notice: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ConfirmPage:
+    """Asks before something that cannot be taken back, or that changes what data mean."""
+
+    template: ClassVar[str] = "admin/confirm.html"
+    frame: Frame
+    head: StudyHead
+    question: str
+    consequences: tuple[str, ...]
+    action: str
+    button: str
+    danger: bool
+    fields: Mapping[str, str]
+    definition: StudyDefinition | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class MonitorPage:
+    template: ClassVar[str] = "admin/monitor.html"
+    frame: Frame
+    head: StudyHead
+    mode: str
+    modes: tuple[Filter, ...]
+    counts: ModeCounts
+    arms: tuple[ArmCount, ...]
+    earlier: tuple[ArmCount, ...]
+    shows: tuple[Filter, ...]
+    people: tuple[PersonLine, ...]
+    people_left: int
+    links: tuple[EntryLink, ...]
+    updated: str
+    live_url: str
+
+
+@dataclass(frozen=True, slots=True)
+class AgentCard:
+    """What an experimenter asks of an agent before people play with it."""
+
+    name: str
+    task: str
+    channel: str
+    budget: str
+    tokens: str
+    success: str
+    figures: tuple[tuple[str, str], ...]
+    sha256: str
+    url: str
+
+
+@dataclass(frozen=True, slots=True)
+class AgentsPage:
+    template: ClassVar[str] = "admin/agents.html"
+    frame: Frame
+    agents: tuple[AgentCard, ...]
+    errors: tuple[str, ...]
+    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class NoticePage:
+    """Any state that is only told, inside the admin."""
+
+    template: ClassVar[str] = "admin/notice.html"
+    frame: Frame
+    heading: str
+    paragraphs: tuple[str, ...]
+    back_url: str
+    back_label: str
