@@ -132,7 +132,7 @@ hidden | boolean | | true if the page was hidden between onset and response.
 resumed | boolean | | true if this state was first drawn before a reload or in another tab.
 refresh_hz | number | Hz | Estimated refresh rate of the screen.
 dropped_frames | integer | frames | Animation frames missed between onset and response.
-board_px | number | CSS px | Side of the board on screen: part of the stimulus.
+board_px | integer | CSS px | Side of the board on screen: part of the stimulus.
 early_keys | integer | key presses | Key presses before the onset; dropped.
 input | string | | What the decision was made with: key or click.
 row | integer | cells | Own cell when deciding: row from the top; from 0.

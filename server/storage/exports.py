@@ -1,10 +1,10 @@
-"""What an export reads: one study's people a page at a time, with their trials and events, each in the order of its key.
+"""What an export reads: a study's people a page at a time, their trials and events, each in order of its key.
 
 Keyset pages keep memory constant and need no sort over the whole study. Nothing here touches `identity`.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 from sqlalchemy import select
 
@@ -12,15 +12,13 @@ from server.storage.database import DbSession
 from server.storage.tables import allocation, consent, event, participant, study, study_version, trial
 
 Row = Mapping[str, Any]
+Event = tuple[str, int, str, str]
 ROWS_A_FETCH = 2_000
 
 
 def study_row(db: DbSession, slug: str) -> Row | None:
-    return (
-        db.read(select(study.c.id, study.c.slug, study.c.title).where(study.c.slug == slug))
-        .mappings()
-        .first()
-    )
+    statement = select(study.c.id, study.c.slug, study.c.title).where(study.c.slug == slug)
+    return next((dict(row) for row in db.read(statement).mappings()), None)
 
 
 def version_rows(db: DbSession, study_id: int) -> list[Row]:
@@ -32,7 +30,7 @@ def version_rows(db: DbSession, study_id: int) -> list[Row]:
         study_version.c.definition,
     )
     statement = select(*columns).where(study_version.c.study_id == study_id).order_by(study_version.c.number)
-    return list(db.read(statement).mappings())
+    return [dict(row) for row in db.read(statement).mappings()]
 
 
 def participant_page(db: DbSession, study_id: int, modes: Sequence[str], after: str, limit: int) -> list[Row]:
@@ -54,7 +52,7 @@ def participant_page(db: DbSession, study_id: int, modes: Sequence[str], after: 
         .order_by(participant.c.id)
         .limit(limit)
     )
-    return list(db.read(statement).mappings())
+    return [dict(row) for row in db.read(statement).mappings()]
 
 
 def trial_rows(db: DbSession, participants: Sequence[str], phases: Sequence[str]) -> list[Row]:
@@ -64,11 +62,11 @@ def trial_rows(db: DbSession, participants: Sequence[str], phases: Sequence[str]
         .where(trial.c.participant_id.in_(participants), trial.c.phase.in_(phases))
         .order_by(trial.c.id)
     )
-    return list(db.read(statement).mappings())
+    return [dict(row) for row in db.read(statement).mappings()]
 
 
-def event_rows(db: DbSession, participants: Sequence[str], phases: Sequence[str]) -> Iterator[Row]:
-    """The events of these trials, by trial and seq, streamed."""
+def event_rows(db: DbSession, participants: Sequence[str], phases: Sequence[str]) -> Iterator[Event]:
+    """The events of these trials, by trial and seq, streamed: trial id, seq, body and time of storing."""
     statement = (
         select(event.c.trial_id, event.c.seq, event.c.body, event.c.stored_utc)
         .join(trial, trial.c.id == event.c.trial_id)
@@ -76,4 +74,4 @@ def event_rows(db: DbSession, participants: Sequence[str], phases: Sequence[str]
         .order_by(event.c.trial_id, event.c.seq)
         .execution_options(yield_per=ROWS_A_FETCH)
     )
-    yield from db.read(statement).mappings()
+    yield from cast("Iterator[Event]", db.read(statement))
