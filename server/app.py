@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 import structlog
 from fastapi import FastAPI
 from fastapi.middleware import Middleware
+from fastapi.telemetry import TelemetryConfig
 
 from server.services.lab import Lab
 from server.settings import Settings
@@ -14,7 +15,8 @@ from server.web import admin, errors, health, participant, play_api
 from server.web.security import BodyLimit, SecurityHeaders
 from server.web.static import VersionedFiles
 
-NO_TELEMETRY = {"tracing": False, "metrics": False, "logs": False}  # nobody is watched beyond the log
+# Nobody is watched beyond the log.
+NO_TELEMETRY: TelemetryConfig = {"tracing": False, "metrics": False, "logs": False}
 
 
 def create_app(lab: Lab) -> FastAPI:
@@ -23,7 +25,7 @@ def create_app(lab: Lab) -> FastAPI:
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         yield
-        lab.close()
+        lab.database.close()
 
     app = FastAPI(
         title="hatlab",

@@ -1,0 +1,220 @@
+"""The command line: `hatlab init | serve | verify | export | simulate`, and the commands of models.cli.
+
+Exit code 0: done; 1: the check failed; 2: bad input, said in one line on stderr. What is slow to import is
+imported by the command that needs it; `hatlab serve` never loads training.
+"""
+
+import sys
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from pydantic import ValidationError
+from typer.core import TyperGroup
+from typer.exceptions import Abort, TyperException
+
+from server.domain.errors import HatlabError, NotReadyError
+
+if TYPE_CHECKING:
+    from server.services.lab import Lab
+    from server.settings import Settings
+
+MODELS_COMMANDS = ("train", "evaluate", "interpret", "bundles", "release")
+REFUSALS = {
+    "models.envs.registry": "UnknownTaskError",
+    "models.policies.bundle": "BundleError",
+    "server.simulate.crowd": "UnreachableError",
+}
+BAD_INPUT = 2
+
+
+class Style(StrEnum):
+    SENSIBLE = "sensible"
+    RANDOM = "random"
+
+
+class Commands(TyperGroup):
+    """The server's commands, and those of models.cli, which is imported when one of them is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:  # noqa: ARG002 (the signature is typer's)
+        return [*self.commands, *MODELS_COMMANDS]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name in MODELS_COMMANDS:
+            from models.cli import app as models_app
+
+            group = typer.main.get_command(models_app)
+            assert isinstance(group, TyperGroup)
+            return group.commands.get(cmd_name)
+        return super().get_command(ctx, cmd_name)
+
+
+app = typer.Typer(
+    cls=Commands,
+    add_completion=False,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+Slug = Annotated[
+    str, typer.Argument(metavar="STUDY", help="The study's name in its link, like parent-child.")
+]
+
+
+@app.callback()
+def hatlab() -> None:
+    """Human-agent-teaming experiments in the browser, with agents whose language emerged in self-play."""
+
+
+@app.command()
+def init() -> None:
+    """Create or migrate the database; an empty one gets the paper's two studies (test mode) and an admin."""
+    from server.services import accounts, lab, studies
+
+    settings = settings_of_environment()
+    lab.prepare(settings)
+    opened = lab.Lab.open(settings)
+    with opened.database.writing() as db:
+        password = accounts.ensure_admin(db, opened)
+        made = studies.ensure_demo_studies(db, opened)
+    opened.database.close()
+    typer.echo(f"database ready: {opened.database.shown_url}")
+    for slug in made:
+        typer.echo(f"study made, open in test mode: {slug}")
+    if password is not None:
+        typer.echo(f"admin password (shown only now): {password}")
+
+
+@app.command()
+def serve(
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(min=0, max=65_535, help="Port to listen on; 0: any free one.")] = 8000,
+    workers: Annotated[int, typer.Option(min=1, max=64, help="Processes that answer.")] = 1,
+) -> None:
+    """Serve participants and experimenters."""
+    from server import serving
+
+    settings = settings_of_environment()
+    serving.serve(settings, host, port, workers)
+
+
+@app.command()
+def verify(
+    study: Annotated[str | None, typer.Argument(metavar="[STUDY]", help="Only this study's trials.")] = None,
+    audit: Annotated[
+        bool, typer.Option(help="Also let the agents decide again, and count differences.")
+    ] = False,
+) -> None:
+    """Execute every stored trial again, compare with what is stored; exit 1 naming the first difference."""
+    from server.services.verify import verify as check
+
+    report = check(open_lab(), study, audit)
+    typer.echo(report.text)
+    raise typer.Exit(0 if report.clean else 1)
+
+
+@app.command()
+def export(
+    study: Slug,
+    out: Annotated[Path, typer.Option(help="Folder to write to; must be empty or not there.")],
+    mode: Annotated[
+        list[str] | None, typer.Option(help="live (the default), test, preview or robot; may be repeated.")
+    ] = None,
+    practice: Annotated[bool, typer.Option(help="Also the practice rounds.")] = False,
+) -> None:
+    """Write the study's data as CSV, with a codebook and a manifest."""
+    from server.services.export import export as write
+
+    manifest = write(open_lab(), study, mode or (), out, practice=practice)
+    for name, facts in manifest["files"].items():
+        typer.echo(f"{facts['rows']:>9} rows  {out / name}")
+
+
+@app.command()
+def simulate(
+    study: Slug,
+    participants: Annotated[int, typer.Option(min=1, help="How many robots.")],
+    seed: Annotated[int, typer.Option(help="Whatever they draw follows from it.")],
+    url: Annotated[
+        str | None, typer.Option(help="The server; default: this installation's public URL.")
+    ] = None,
+    style: Annotated[Style, typer.Option(help="How they play.")] = Style.SENSIBLE,
+) -> None:
+    """Let robots walk the whole study over HTTP, in mode robot; exit 1 if one of them does not finish."""
+    from itsdangerous import TimestampSigner
+    from rich.console import Console
+
+    from server.simulate.crowd import Crowd
+    from server.simulate.report import run
+
+    settings = settings_of_environment()
+    signer = TimestampSigner(secret_key(settings), salt="robot")
+    crowd = Crowd(study, participants, seed, url or settings.public_url, style.value)
+    complete = run(crowd, lambda: signer.sign(study).decode(), Console())
+    raise typer.Exit(0 if complete else 1)
+
+
+def settings_of_environment() -> "Settings":
+    from server.settings import Settings
+
+    return Settings()
+
+
+def open_lab() -> "Lab":
+    from server.services.lab import Lab
+
+    return Lab.open(settings_of_environment())
+
+
+def secret_key(settings: "Settings") -> str:
+    """The key that robots are signed with: the setting, or the one in this installation's database."""
+    from server.services.lab import secret_of
+    from server.storage.database import Database
+
+    if settings.secret_key is not None:
+        return settings.secret_key.get_secret_value()
+    database = Database(settings.database_url)
+    if not database.is_current():
+        raise NotReadyError("no secret key to sign robots with: set HATLAB_SECRET_KEY or run `hatlab init`")
+    return secret_of(settings, database)
+
+
+def main() -> None:
+    """Run the command line; every bad input becomes one line and exit code 2."""
+    try:
+        code = app(standalone_mode=False)
+    except TyperException as error:
+        code = refuse(error.format_message())
+    except HatlabError as error:
+        code = refuse(error.detail)
+    except ValidationError as error:
+        code = refuse(settings_error(error))
+    except Abort:
+        code = 130
+    except Exception as error:
+        if not is_refusal(error):
+            raise
+        code = refuse(str(error))
+    sys.exit(code if isinstance(code, int) else 0)
+
+
+def refuse(reason: str) -> int:
+    """One line on stderr."""
+    print("hatlab:", " ".join(reason.split()), file=sys.stderr)
+    return BAD_INPUT
+
+
+def is_refusal(error: Exception) -> bool:
+    """Whether it is one of the errors by which other parts refuse input, without importing those parts."""
+    return any(
+        isinstance(error, getattr(sys.modules[module], name))
+        for module, name in REFUSALS.items()
+        if module in sys.modules
+    )
+
+
+def settings_error(error: ValidationError) -> str:
+    """The first wrong setting by its variable's name; the value may be a secret and is not repeated."""
+    first = error.errors()[0]
+    return f"HATLAB_{'_'.join(str(part) for part in first['loc']).upper()}: {first['msg']}"
