@@ -31,7 +31,8 @@ class Action:
 class ConsentPage:
     """The entry page.
 
-    The form posts to `action`: the hidden `identifiers`; the button's `agree` = "yes" or "no"; the tick
+    `welcome` is the lead, `agree_text` stands beside the tick (both in the study's texts). A paragraph "Heading: text" gets
+    its heading. The form posts to `action`: the hidden `identifiers`; the button's `agree` = "yes" or "no"; the tick
     `read` = "yes"; and what the browser says about itself: `device` (desktop, tablet, phone), `browser`,
     `viewport` ("1280x720"), all three empty without scripts.
     """
