@@ -1,0 +1,6 @@
+"""Training: ``run(recipe, folder)`` follows a recipe and returns the best policy."""
+
+from models.training.config import Recipe, RecipeError
+from models.training.run import TrainingError, TrainingResult, run
+
+__all__ = ["Recipe", "RecipeError", "TrainingError", "TrainingResult", "run"]

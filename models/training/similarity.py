@@ -1,0 +1,92 @@
+"""Information similarity: can the world be read off what was heard? An auxiliary loss, in training only.
+
+Traffic Junction: occupancy of every road cell by the other cars now, and the cells that they would enter with gas (their
+intent). Parent & Lost Child: the cell of the speaker, or its row and column. Shapes: M rows, C road cells, D message.
+
+Source: Karten et al. 2023, information similarity; intent after the paper's section on Traffic Junction.
+"""
+
+from typing import Any
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from models.envs.api import Environment
+from models.envs.traffic_junction import TrafficJunction
+from models.training.config import Decoder
+from models.training.imitation import intent
+from models.training.unroll import Unrolled
+
+
+class Reader(nn.Module):
+    """Predicts the target from the inbox, or from [second hidden, inbox]."""
+
+    def __init__(self, env: Environment[Any], settings: Decoder, hidden: int, message: int) -> None:
+        super().__init__()
+        self.settings = settings
+        size = target_size(env, settings)
+        if settings.reads == "inbox":
+            self.read: nn.Module = nn.Linear(message, size)
+        else:
+            self.read = nn.Sequential(nn.Linear(hidden + message, hidden), nn.ReLU(), nn.Linear(hidden, size))
+
+    def forward(self, hidden: Tensor, inbox: Tensor) -> Tensor:
+        heard = inbox if self.settings.reads == "inbox" else torch.cat((hidden, inbox), 1)
+        return self.read(heard)  # type: ignore[no-any-return]
+
+
+def target_size(env: Environment[Any], settings: Decoder) -> int:
+    """Numbers that the reader predicts."""
+    if settings.target == "occupancy":
+        assert isinstance(env, TrafficJunction)
+        return 2 * len(env.roads.road_cells)
+    return 2 if settings.target == "coordinates" else env.cells
+
+
+def similarity_loss(env: Environment[Any], reader: Reader, seen: Unrolled) -> Tensor:
+    """Mean loss over the rows that listen: cross-entropy in nats (summed over cells), or squared error."""
+    if reader.settings.target == "occupancy":
+        assert isinstance(env, TrafficJunction)
+        target = torch.from_numpy(occupancy(env, seen))
+        read = reader(seen.hidden, seen.inbox)
+        return nn.functional.binary_cross_entropy_with_logits(read, target, reduction="none").sum(1).mean()
+    listens = ~env.speaks[seen.place % env.agents]
+    rows = torch.from_numpy(np.flatnonzero(listens))
+    cell = torch.from_numpy(_speaker_cell(env, seen)[listens])
+    read = reader(seen.hidden[rows], seen.inbox[rows])
+    if reader.settings.target == "location":
+        return nn.functional.cross_entropy(read, cell)
+    height, width = env.shape
+    place = torch.stack((cell // width / (height - 1), cell % width / (width - 1)), 1)
+    return (read - place).square().sum(1).mean()
+
+
+def occupancy(env: TrafficJunction, seen: Unrolled) -> np.ndarray[Any, np.dtype[np.float32]]:
+    """(M, 2C): is another car on each road cell now; would another enter it with gas."""
+    column = np.full(env.cells + 1, -1)
+    column[env.roads.road_cells] = np.arange(len(env.roads.road_cells))
+    now = np.stack([column[env.cell_of(state)] for state in seen.states[:-1]])  # (T, B, N)
+    then = np.stack([column[intent(env, state)] for state in seen.states[:-1]])
+    return np.concatenate([_others(part, len(env.roads.road_cells), seen) for part in (now, then)], 1)
+
+
+def _others(columns: Any, size: int, seen: Unrolled) -> np.ndarray[Any, np.dtype[np.float32]]:
+    """(M, C): whether any other living car has each column; columns (T, B, N), -1 for none."""
+    batch, seats = columns.shape[1:]
+    counted = seen.living & (columns >= 0)
+    step, episode, _ = np.nonzero(counted)
+    count = np.zeros((len(columns), batch, size), np.int16)
+    np.add.at(count, (step, episode, columns[counted]), 1)
+    rows = count[seen.step, seen.place // seats]  # (M, C)
+    own = columns.reshape(len(columns), -1)[seen.step, seen.place]
+    has = np.flatnonzero(own >= 0)
+    rows[has, own[has]] -= 1
+    return (rows > 0).astype(np.float32)
+
+
+def _speaker_cell(env: Environment[Any], seen: Unrolled) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """(M,) cell of the one seat that speaks, at each row's step and episode."""
+    speaker = int(np.flatnonzero(env.speaks)[0])
+    cells = np.stack([env.cell_of(state)[:, speaker] for state in seen.states[:-1]])  # (T, B)
+    return cells[seen.step, seen.place // env.agents].astype(np.int64)
