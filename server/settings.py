@@ -30,7 +30,7 @@ class Settings(BaseSettings):
     behind_https: bool = False
     """True behind a TLS proxy: cookies are Secure and HSTS is sent."""
     trusted_proxies: str = ""
-    """Addresses of proxies (commas between) whose X-Forwarded-For and -Proto are believed; empty: nobody's."""
+    """Addresses of proxies (commas between) whose X-Forwarded-… headers are believed; empty: nobody's."""
     trial_cache: int = Field(default=256, ge=0)
     """Folded trials kept in memory by each worker; 0 turns the cache off. Never changes an answer."""
     body_max_bytes: int = Field(default=65_536, ge=1_024)

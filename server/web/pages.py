@@ -31,10 +31,10 @@ class Action:
 class ConsentPage:
     """The entry page.
 
-    `welcome` is the lead, `agree_text` stands beside the tick (both in the study's texts). A paragraph "Heading: text" gets
-    its heading. The form posts to `action`: the hidden `identifiers`; the button's `agree` = "yes" or "no"; the tick
-    `read` = "yes"; and what the browser says about itself: `device` (desktop, tablet, phone), `browser`,
-    `viewport` ("1280x720"), all three empty without scripts.
+    `welcome` is the lead, `agree_text` stands beside the tick (both in the study's texts). A paragraph
+    "Heading: text" gets its heading. The form posts to `action`: the hidden `identifiers`; the button's
+    `agree` = "yes" or "no"; the tick `read` = "yes"; and what the browser says about itself: `device`
+    (desktop, tablet, phone), `browser`, `viewport` ("1280x720"), all three empty without scripts.
     """
 
     template: ClassVar[str] = "participant/consent.html"

@@ -1,7 +1,7 @@
 """A browser without a screen: httpx straight into the ASGI application, with a cookie jar.
 
-Redirects are not followed, and an error of the application is raised, unless asked otherwise. (The TestClient of
-Starlette wants a package that hatlab does not use.)
+Redirects are not followed, and an error of the application is raised, unless asked otherwise. (The TestClient
+of Starlette wants a package that hatlab does not use.)
 """
 
 from typing import Any
