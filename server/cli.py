@@ -32,6 +32,7 @@ BAD_INPUT = 2
 class Style(StrEnum):
     SENSIBLE = "sensible"
     RANDOM = "random"
+    MIXED = "mixed"
 
 
 class Commands(TyperGroup):
@@ -139,7 +140,11 @@ def simulate(
     url: Annotated[
         str | None, typer.Option(help="The server; default: this installation's public URL.")
     ] = None,
-    style: Annotated[Style, typer.Option(help="How they play.")] = Style.SENSIBLE,
+    style: Annotated[Style, typer.Option(help="How they play; mixed: in turn.")] = Style.SENSIBLE,
+    concurrency: Annotated[int, typer.Option(min=1, max=1_000, help="How many play at once.")] = 20,
+    rate: Annotated[
+        float | None, typer.Option(min=0.001, help="Decisions a second of each; default: no pause.")
+    ] = None,
 ) -> None:
     """Let robots walk the whole study over HTTP, in mode robot; exit 1 if one of them does not finish."""
     from itsdangerous import TimestampSigner
@@ -150,7 +155,7 @@ def simulate(
 
     settings = settings_of_environment()
     signer = TimestampSigner(secret_key(settings), salt="robot")
-    crowd = Crowd(study, participants, seed, url or settings.public_url, style.value)
+    crowd = Crowd(study, participants, seed, url or settings.public_url, style.value, concurrency, rate)
     complete = run(crowd, lambda: signer.sign(study).decode(), Console())
     raise typer.Exit(0 if complete else 1)
 

@@ -25,7 +25,7 @@ REACH_S = 5.0
 
 
 class UnreachableError(Exception):
-    """No hatlab server answers; the message says how to start one."""
+    """No hatlab server answers, or it has no such study; the message says what to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ def simulate(
     """Run the robots to their end; `sign` gives a fresh robot signature for the study.
 
     Raises:
-        UnreachableError: no hatlab server answers at the address.
+        UnreachableError: no hatlab server with this study answers at the address.
     """
     return asyncio.run(_simulate(crowd, sign, on_done))
 
@@ -86,19 +86,23 @@ def simulate(
 async def _simulate(
     crowd: Crowd, sign: Callable[[], str], on_done: Callable[[Result], None] | None
 ) -> list[Result]:
-    await _reach(crowd.url)
+    await _reach(crowd)
     return await play(crowd, sign, on_done)
 
 
-async def _reach(url: str) -> None:
+async def _reach(crowd: Crowd) -> None:
+    url = crowd.url
     advice = f"no hatlab server answers at {url}: start one with `hatlab serve`, or name another with --url"
     try:
         async with httpx.AsyncClient(base_url=url, timeout=REACH_S) as client:
-            answer = await client.get("/healthz")
+            health = await client.get("/healthz")
+            study = await client.get(f"/s/{crowd.slug}")
     except (httpx.HTTPError, httpx.InvalidURL) as error:
         raise UnreachableError(advice) from error
-    if not answer.headers.get("content-type", "").startswith("application/json"):
+    if not health.headers.get("content-type", "").startswith("application/json"):
         raise UnreachableError(advice)
+    if study.status_code == httpx.codes.NOT_FOUND:
+        raise UnreachableError(f"no study is called {crowd.slug} at {url}")
 
 
 async def play(
