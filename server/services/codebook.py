@@ -118,9 +118,9 @@ trial_id | string | | Key of the trial in trials.csv.
 seq | integer | | Decision within the trial, from 1. What was shown before it was stored with event seq - 1.
 phase | string | | practice or main.
 role | string | | parent, child or driver.
-action | integer | | Parent: 0 up, 1 right, 2 down, 3 left, 4 stay. Child: token_shown. Driver: 0 go, 1
-  brake.
-action_name | string | | The same as a word: up, right, down, left, stay; sign; go, brake.
+action | integer | | Parent: 0 up, 1 right, 2 down, 3 left. Child: token_shown, the number of the chosen
+  sign. Driver: 0 go, 1 brake.
+action_name | string | | The same as a word: up, right, down, left; sign; go, brake.
 rt_ms | number | ms | Reaction time: response_ms - onset_ms. Holds no network time.
 rt_valid | boolean | | true if the page was never hidden, not resumed after a reload, and rt_ms ≥ 0.
 onset_ms | number | ms | Page clock when the state was drawn (inside an animation frame).

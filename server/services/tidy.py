@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from models.vocabulary import SILENT
+from server.domain.events import rt_valid
 from server.services import codebook
 
 Row = Mapping[str, Any]
@@ -22,7 +23,7 @@ GOOD_OUTCOMES = frozenset({"found", "arrived"})
 BAD_OUTCOMES = frozenset({"not_found", "collision", "limit"})
 ABANDONED = "abandoned"
 ACTION_NAMES: Mapping[str, tuple[str, ...]] = {
-    "parent": ("up", "right", "down", "left", "stay"),
+    "parent": ("up", "right", "down", "left"),
     "driver": ("go", "brake"),
 }
 CHILD_SEAT = 1
@@ -184,11 +185,6 @@ def reaction_times(told: Story) -> dict[str, float | int | None]:
         "rt_ms_mean": round(fmean(valid), DIGITS_MS) if valid else None,
         "rt_ms_median": round(median(valid), DIGITS_MS) if valid else None,
     }
-
-
-def rt_valid(timing: Row) -> bool:
-    """Whether nothing came between onset and response that makes the difference no reaction time."""
-    return not timing["hidden"] and not timing["resumed"] and timing["rt_ms"] >= 0
 
 
 def step_rows(told: Story) -> Iterator[Cells]:
