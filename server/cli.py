@@ -75,7 +75,7 @@ def init() -> None:
 
     settings = settings_of_environment()
     lab.prepare(settings)
-    opened = lab.Lab.open(settings)
+    opened = lab.Lab.without_agents(settings)
     with opened.database.writing() as db:
         password = accounts.ensure_admin(db, opened)
         made = studies.ensure_demo_studies(db, opened)

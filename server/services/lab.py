@@ -8,12 +8,11 @@ import hmac
 import secrets
 from base64 import urlsafe_b64encode
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-from models.policies import bundle as released
-from models.policies.bundle import PolicyBundle
 from server.domain import canonical
 from server.domain.errors import NotReadyError
 from server.domain.study import Offer
@@ -21,6 +20,9 @@ from server.services.recent import Recent
 from server.settings import Settings
 from server.storage import installation
 from server.storage.database import Database
+
+if TYPE_CHECKING:
+    from models.policies.bundle import PolicyBundle
 
 SECRET = "secret_key"  # noqa: S105 the name of the row, not the secret
 SEED_BITS = 53  # exact in JavaScript and in spreadsheets
@@ -34,7 +36,7 @@ def clock() -> datetime:
 class Lab:
     settings: Settings
     database: Database
-    bundles: Mapping[str, PolicyBundle]
+    bundles: "Mapping[str, PolicyBundle]"
     bundle_errors: tuple[str, ...]
     secret_key: str
     now: Callable[[], datetime] = clock
@@ -47,15 +49,27 @@ class Lab:
         Raises:
             NotReadyError: the database is missing, out of reach or not migrated.
         """
+        ready = cls.without_agents(settings)
+        from models.policies import bundle as released  # loads torch, which takes seconds
+
+        bundles, errors = released.find(settings.bundles)
+        return replace(ready, bundles=bundles, bundle_errors=errors)
+
+    @classmethod
+    def without_agents(cls, settings: Settings) -> "Lab":
+        """The same for what needs no agents: quick, for it does not load torch.
+
+        Raises:
+            NotReadyError: the database is missing, out of reach or not migrated.
+        """
         database = Database(settings.database_url)
         if not database.is_current():
             raise NotReadyError(f"database {database.shown_url} is not migrated: run `hatlab init`")
-        bundles, errors = released.find(settings.bundles)
         return cls(
             settings=settings,
             database=database,
-            bundles=bundles,
-            bundle_errors=errors,
+            bundles={},
+            bundle_errors=(),
             secret_key=secret_of(settings, database),
             cache=Recent(settings.trial_cache),
         )
@@ -108,7 +122,7 @@ def secret_of(settings: Settings, database: Database) -> str:
     return secret
 
 
-def offer_of(bundle: PolicyBundle) -> Offer:
+def offer_of(bundle: "PolicyBundle") -> Offer:
     manifest = bundle.manifest
     return Offer(
         name=bundle.name,
