@@ -1,0 +1,253 @@
+// @ts-check
+// The board of Parent & Lost Child: 490 drawing units square, whatever its size on screen. Pure.
+
+import { h } from "./drawing.js";
+import { figure } from "./symbols.js";
+
+/** @import { Cell, ParentView, ChildView, Drawing } from "../lib/types.js" */
+
+const SIDE = 490;
+const MARGIN = 2; // room for the frame: 486 units make the cells
+
+/**
+ * What the parent sees: fog, the square around them, where they walked; the child only if the view has it.
+ * @param {ParentView} view
+ */
+export function parentBoard(view) {
+  const child = view.over?.child ?? view.child;
+  const found = view.over?.outcome === "found";
+  return board(view.size, parentLabel(view), [
+    field("fog", view.size),
+    patch("seen", view.size, view.cell, view.vision),
+    frame(),
+    trail(view.size, view.trail),
+    square(view.size, view.cell, view.vision),
+    view.over && child && !found && missed(view.size, child),
+    ...people(view.size, view.cell, child, found),
+  ]);
+}
+
+/**
+ * What the child sees before it chooses: the whole board, itself, and the parent if the study shows it.
+ * @param {ChildView} view
+ */
+export function choiceBoard(view) {
+  const label = `Board, ${view.size} by ${view.size}. You are at ${at(view.cell)}.`;
+  return board(view.size, view.parent ? `${label} The parent is at ${at(view.parent)}.` : label, [
+    field("seen", view.size),
+    frame(),
+    view.parent &&
+      h("g", { class: "faint" }, square(view.size, view.parent, view.vision), person(view.size, "parent", view.parent)),
+    person(view.size, "child", view.cell),
+  ]);
+}
+
+/**
+ * The parent's walk after `steps` of it.
+ * @param {ChildView} view
+ * @param {number} steps
+ */
+export function replayBoard(view, steps) {
+  const walk = (view.walk ?? []).slice(0, steps + 1);
+  const parent = walk.at(-1) ?? view.cell;
+  const found = same(parent, view.cell);
+  const label = found ? `The parent found you at ${at(view.cell)}.` : `Replay: the parent after ${steps} steps.`;
+  return board(view.size, label, [
+    field("seen", view.size),
+    frame(),
+    trail(view.size, walk),
+    square(view.size, parent, view.vision),
+    ...people(view.size, parent, view.cell, found),
+  ]);
+}
+
+/** @param {ParentView} view */
+function parentLabel(view) {
+  const child = view.over?.child ?? view.child;
+  if (view.over?.outcome === "found") return `You found the child at ${at(view.cell)}.`;
+  const here = `Board, ${view.size} by ${view.size}. You are at ${at(view.cell)}.`;
+  return child ? `${here} The child is at ${at(child)}.` : here;
+}
+
+/**
+ * @param {number} size
+ * @param {string} label
+ * @param {(Drawing | Drawing[] | null | false)[]} parts
+ */
+function board(size, label, parts) {
+  return h(
+    "svg",
+    { viewBox: `0 0 ${SIDE} ${SIDE}`, role: "img", "aria-label": label, "data-size": size },
+    parts.flat(),
+  );
+}
+
+/** @param {Cell} cell Cells are counted from 1 for people. */
+function at([row, column]) {
+  return `row ${row + 1}, column ${column + 1}`;
+}
+
+/** @param {number} size */
+function unit(size) {
+  return (SIDE - 2 * MARGIN) / size;
+}
+
+/**
+ * The centre of a cell.
+ * @param {number} size
+ * @param {Cell} cell
+ */
+export function centre(size, [row, column]) {
+  return { x: MARGIN + (column + 0.5) * unit(size), y: MARGIN + (row + 0.5) * unit(size) };
+}
+
+/**
+ * @param {"fog" | "seen"} kind
+ * @param {number} size
+ */
+function field(kind, size) {
+  return area(kind, size, 0, size, 0, size);
+}
+
+/**
+ * The part of the board within `reach` of a cell.
+ * @param {"seen"} kind
+ * @param {number} size
+ * @param {Cell} cell
+ * @param {number} reach
+ */
+function patch(kind, size, cell, reach) {
+  const [top, bottom, left, right] = window(size, cell, reach);
+  return area(kind, size, top, bottom, left, right);
+}
+
+/**
+ * @param {number} size
+ * @param {Cell} cell
+ * @param {number} reach
+ * @returns {[top: number, bottom: number, left: number, right: number]} half-open, clipped at the border
+ */
+function window(size, [row, column], reach) {
+  return [
+    Math.max(0, row - reach),
+    Math.min(size, row + reach + 1),
+    Math.max(0, column - reach),
+    Math.min(size, column + reach + 1),
+  ];
+}
+
+/**
+ * @param {"fog" | "seen"} kind
+ * @param {number} size
+ * @param {number} top
+ * @param {number} bottom
+ * @param {number} left
+ * @param {number} right
+ */
+function area(kind, size, top, bottom, left, right) {
+  const u = unit(size);
+  const [x0, x1, y0, y1] = [left, right, top, bottom].map((edge) => MARGIN + edge * u);
+  const across = Array.from(
+    { length: right - left - 1 },
+    (_, i) => `M${num(MARGIN + (left + i + 1) * u)} ${num(y0)}V${num(y1)}`,
+  );
+  const down = Array.from(
+    { length: bottom - top - 1 },
+    (_, i) => `M${num(x0)} ${num(MARGIN + (top + i + 1) * u)}H${num(x1)}`,
+  );
+  return [
+    h("rect", { class: kind, x: x0, y: y0, width: (right - left) * u, height: (bottom - top) * u }),
+    h("path", { class: `${kind}-line`, d: [...across, ...down].join("") }),
+  ];
+}
+
+function frame() {
+  return h("rect", { class: "frame", x: 1, y: 1, width: SIDE - 2, height: SIDE - 2, rx: 2 });
+}
+
+/**
+ * The line where someone walked: a ring at the start, a dot at each cell between.
+ * @param {number} size
+ * @param {Cell[]} cells
+ */
+function trail(size, cells) {
+  if (cells.length === 0) return [];
+  const points = cells.map((cell) => centre(size, cell));
+  const line = points.map(({ x, y }) => `${num(x)} ${num(y)}`).join("L");
+  const start = /** @type {{x: number, y: number}} */ (points[0]);
+  return [
+    points.length > 1 && h("path", { class: "trail", d: `M${line}` }),
+    ...points.slice(1, -1).map(({ x, y }) => h("circle", { class: "trail-dot", cx: x, cy: y, r: 6 })),
+    h("circle", { class: "trail-start", cx: start.x, cy: start.y, r: 9 }),
+  ].filter((node) => node !== false);
+}
+
+/**
+ * The frame around what a parent at `cell` sees.
+ * @param {number} size
+ * @param {Cell} cell
+ * @param {number} reach
+ */
+function square(size, cell, reach) {
+  const [top, bottom, left, right] = window(size, cell, reach);
+  const u = unit(size);
+  return h("rect", {
+    class: "vision",
+    x: MARGIN + left * u,
+    y: MARGIN + top * u,
+    width: (right - left) * u,
+    height: (bottom - top) * u,
+    rx: 3,
+  });
+}
+
+/**
+ * @param {number} size
+ * @param {"parent" | "child"} name
+ * @param {Cell} cell
+ */
+function person(size, name, cell) {
+  const { x, y } = centre(size, cell);
+  return figure(name, { x, y, size: name === "parent" ? 46 : 50, class: `${name} halo` });
+}
+
+/**
+ * Parent and child; together in a ring once they have met.
+ * @param {number} size
+ * @param {Cell} parent
+ * @param {Cell | null} child
+ * @param {boolean} met
+ */
+function people(size, parent, child, met) {
+  if (!met)
+    return [child && person(size, "child", child), person(size, "parent", parent)].filter((one) => one !== null);
+  const { x, y } = centre(size, parent);
+  return [
+    h("circle", { class: "arrive-ring on-seen", cx: x, cy: y, r: 34 }),
+    figure("parent", { x: x - 11, y, size: 46, class: "parent halo" }),
+    figure("child", { x: x + 14, y, size: 46, class: "child halo" }),
+  ];
+}
+
+/**
+ * Where the child was, once it can no longer be found.
+ * @param {number} size
+ * @param {Cell} cell
+ */
+function missed(size, cell) {
+  const { x, y } = centre(size, cell);
+  return h("circle", { class: "miss-ring on-seen", cx: x, cy: y, r: 30 });
+}
+
+/**
+ * @param {Cell} a
+ * @param {Cell} b
+ */
+function same(a, b) {
+  return a[0] === b[0] && a[1] === b[1];
+}
+
+/** @param {number | undefined} value */
+function num(value) {
+  return Math.round((value ?? 0) * 100) / 100;
+}
