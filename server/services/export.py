@@ -12,7 +12,6 @@ import json
 import zipfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
 from importlib.metadata import version
 from itertools import groupby, islice
 from operator import itemgetter
@@ -21,6 +20,7 @@ from typing import Any, Literal, get_args
 
 from server.domain import canonical
 from server.domain.errors import BadInputError, NotFoundError
+from server.domain.participation import has_left
 from server.domain.study import from_json
 from server.services import codebook, tidy, tracks
 from server.services.lab import Lab
@@ -211,8 +211,8 @@ def _files(
     leases = {row["number"]: from_json(row["definition"]).lease_min for row in versions}
 
     def left(person: tidy.Row) -> bool:
-        limit = canonical.utc_text(moment - timedelta(minutes=leases[person["study_version"]]))
-        return bool(person["status"] == "active" and person["last_seen_utc"] < limit)
+        lease_began = canonical.minutes_before(moment, leases[person["study_version"]])
+        return has_left(person["status"], person["last_seen_utc"], lease_began)
 
     for table, build in _BUILDERS.items():
         pages = _pages(db, choice, left, with_events=table != "participants")

@@ -86,7 +86,7 @@ def story(trial: Row, events: Sequence[tuple[int, Row, str]]) -> Story:
 
 
 def participant_row(study: str, person: Row, *, left: bool) -> Cells:
-    """Build a row of participants.csv; `left`: active, but not heard of for longer than the lease."""
+    """Build a row of participants.csv; `left`: unfinished, and not heard of for longer than the lease."""
     own = {
         **person,
         "study": study,
