@@ -19,7 +19,7 @@ CHANNELS = ("none", "continuous", "prototype", "one-hot")
 
 
 class Utterance(NamedTuple):
-    """R raw vectors after the channel: token (R,) int64 (-1: none), message (R, D), loss scalar (codebook upkeep)."""
+    """R raw vectors after the channel: token (R,) int64 (-1: none), message (R, D), loss (R,) (codebook upkeep)."""
 
     token: Tensor
     message: Tensor
@@ -31,7 +31,7 @@ class ContinuousChannel(nn.Module):
 
     def forward(self, raw: Tensor) -> Utterance:
         token = torch.full((raw.shape[0],), -1, dtype=torch.int64)
-        return Utterance(token, raw, raw.new_zeros(()))
+        return Utterance(token, raw, raw.new_zeros(len(raw)))
 
 
 class NoChannel(nn.Module):
@@ -39,7 +39,7 @@ class NoChannel(nn.Module):
 
     def forward(self, raw: Tensor) -> Utterance:
         token = torch.full((raw.shape[0],), -1, dtype=torch.int64)
-        return Utterance(token, torch.zeros_like(raw), raw.new_zeros(()))
+        return Utterance(token, torch.zeros_like(raw), raw.new_zeros(len(raw)))
 
 
 class PrototypeChannel(nn.Module):
@@ -59,8 +59,7 @@ class PrototypeChannel(nn.Module):
         prototype = self.codebook[token]  # (R, D)
         pull = (prototype - raw.detach()).square().sum(1)
         commit = (raw - prototype.detach()).square().sum(1)
-        loss = (pull + COMMITMENT * commit).mean() if len(raw) else raw.new_zeros(())
-        return Utterance(token, straight_through(prototype.detach(), raw), loss)
+        return Utterance(token, straight_through(prototype.detach(), raw), pull + COMMITMENT * commit)
 
 
 class OneHotChannel(nn.Module):
@@ -71,7 +70,7 @@ class OneHotChannel(nn.Module):
         soft = raw.softmax(1)  # (R, K)
         token = raw.argmax(1) if draws is None else pick(soft.detach(), draws)
         hard = nn.functional.one_hot(token, raw.shape[1]).to(raw.dtype)
-        return Utterance(token, straight_through(hard, soft), raw.new_zeros(()))
+        return Utterance(token, straight_through(hard, soft), raw.new_zeros(len(raw)))
 
 
 Channel = NoChannel | ContinuousChannel | PrototypeChannel | OneHotChannel

@@ -197,7 +197,8 @@ class Trainer:
         if not isinstance(channel, PrototypeChannel):
             return
         continuous = self.phase.model_copy(update={"discrete": False})
-        raw = [self._unroll(continuous, self.at.total + number)[0].raw for number in range(CODEBOOK_BATCHES)]
+        seen = [self._unroll(continuous, self.at.total + number)[0] for number in range(CODEBOOK_BATCHES)]
+        raw = [one.raw[torch.from_numpy(np.flatnonzero(one.uttered))] for one in seen]
         draws = generator(self.recipe.seed, self.at.total)
         channel.codebook.copy_(kmeans(torch.cat(raw), self.recipe.model.tokens, draws))
 
@@ -254,12 +255,12 @@ class Trainer:
         channel, phase = self.learner.net.channel, self.phase
         if not isinstance(channel, PrototypeChannel) or not phase.discrete or not phase.revive_every:
             return
-        speaks = torch.from_numpy(self.env.speaks[seen.place % self.env.agents])
-        self._uses += torch.bincount(seen.token[speaks], minlength=len(self._uses))
+        uttered = torch.from_numpy(np.flatnonzero(seen.uttered))
+        self._uses += torch.bincount(seen.token[uttered], minlength=len(self._uses))
         early = self.at.update < 0.8 * phase.updates  # what is revived must have time to find its meaning
         if early and (self.at.update + 1) % phase.revive_every == 0:
             draws = generator(self.recipe.seed + 1, self.at.total)
-            channel.codebook.copy_(revived(channel.codebook, self._uses, seen.raw[speaks], draws))
+            channel.codebook.copy_(revived(channel.codebook, self._uses, seen.raw[uttered], draws))
             self._uses.zero_()
 
     # -- checks ------------------------------------------------------------------------------------------------------

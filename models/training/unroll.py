@@ -69,7 +69,9 @@ class Unrolled(NamedTuple):
     gate_logit: Tensor
     """(M,)"""
     channel_loss: Tensor
-    """scalar"""
+    """scalar: mean over the rows that were uttered"""
+    uttered: Bools
+    """(M,) the message of this row can be heard: its seat speaks and, where messages are held, it is the first."""
     living: Bools
     """(T, B, N)"""
     continues: Bools
@@ -221,12 +223,13 @@ def _collect(
 ) -> Unrolled:
     features = torch.cat([r.features for r in rows])
     hidden = rows[0].said.memory.shape[1] // 5
-    sizes = torch.tensor([float(len(r.place)) for r in rows])
-    losses = torch.stack([r.said.loss for r in rows])
+    step, place = np.concatenate([r.step for r in rows]), np.concatenate([r.place for r in rows])
+    uttered = env.speaks[place % env.agents] & ((step == 0) | (not env.message_held))
+    losses = torch.cat([r.said.loss for r in rows])[torch.from_numpy(np.flatnonzero(uttered))]
     after = [env.alive(s) & ~env.fresh(s) & ~env.done(s)[:, None] for s in states[1:]]
     return Unrolled(
-        step=np.concatenate([r.step for r in rows]),
-        place=np.concatenate([r.place for r in rows]),
+        step=step,
+        place=place,
         logits=torch.cat([r.logits for r in rows]),
         action=torch.cat([r.action for r in rows]),
         features=features,
@@ -236,7 +239,8 @@ def _collect(
         token=torch.cat([r.said.token for r in rows]),
         gate=torch.cat([r.said.gate for r in rows]),
         gate_logit=torch.cat([r.said.gate_logit for r in rows]),
-        channel_loss=(losses * sizes).sum() / sizes.sum().clamp(min=1),
+        channel_loss=losses.sum() / max(len(losses), 1),
+        uttered=uttered,
         living=np.stack(living),
         continues=np.stack([now & then for now, then in zip(living, after, strict=True)]),
         rewards=np.stack(rewards),
