@@ -211,10 +211,10 @@ class TrafficJunction:
         """Put new cars in, entrance by entrance; draws belong to the step that led to `state.t`."""
         draws = rng.words(state.seed[:, None, None], ARRIVALS, state.t[:, None, None], self._draws)
         wanted = rng.chance(draws[:, :, 0], state.arrival_threshold[:, None])
+        wanted &= self._guest_cell(state)[:, None] != self.entry_cells
         alive, route = state.alive.copy(), state.route.copy()
-        guest_cell = self._guest_cell(state)
-        for entrance, entry in enumerate(self.entry_cells):
-            row = np.flatnonzero(wanted[:, entrance] & (guest_cell != entry))
+        for entrance in np.flatnonzero(wanted.any(0)):
+            row = np.flatnonzero(wanted[:, entrance])
             empty = ~alive[row]
             empty &= np.arange(self.agents) != state.guest[row, None]
             choices = empty.sum(1)
