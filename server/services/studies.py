@@ -1,7 +1,7 @@
 """Studies as experimenters make them: templates, drafts, launching, opening and closing.
 
-A draft is whatever was typed, kept even while it is wrong. Launching turns it into a version, which never changes
-again. What people do is elsewhere (enrol, play); what a definition is, in domain/study.
+A draft is whatever was typed, kept even while it is wrong. Launching turns it into a version that stays as it
+is. What people do is elsewhere (enrol, play); what a definition is, in domain/study.
 """
 
 import re
@@ -112,6 +112,10 @@ def every(db: DbSession) -> list[Study]:
     return [study_of(db, row) for row in studies.every(db)]
 
 
+def how_many(db: DbSession) -> int:
+    return len(studies.every(db))
+
+
 def study_of(db: DbSession, row: StudyRow) -> Study:
     version = studies.newest_version(db, row.id)
     text = row.draft or (version.definition if version else "{}")
@@ -175,6 +179,14 @@ def free_slug(db: DbSession, title: str) -> str:
 def judged(values: Mapping[str, Any], lab: Lab) -> tuple[StudyDefinition | None, dict[str, str]]:
     """The definition in `values` if it can be launched here, and a message for each wrong field."""
     return mistakes_of(values, lambda study: {**dict(contradictions(study)), **misfits(study, lab.offers)})
+
+
+def missing_agents(study: Study, lab: Lab) -> set[str]:
+    """Agents that the newest version names and this server has not loaded."""
+    if study.definition is None:
+        return set()
+    named = {arm.bundle for arm in study.definition.arms} | {study.definition.panel_bundle or ""}
+    return named - {""} - set(lab.offers)
 
 
 def save_draft(

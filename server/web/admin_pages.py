@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from server.domain.study import StudyDefinition
+from server.services.agents import Condition, Figure, TokenMeaning
 from server.services.monitor import ArmCount, ModeCounts, PersonLine
 from server.services.studies import Blank
 
@@ -43,8 +44,6 @@ class StudyLine:
     places: int
     finished: int
     active: int
-    abandoned: int
-    others: str
     last_activity: str
     last_activity_utc: str
 
@@ -195,7 +194,7 @@ class MonitorPage:
     people_left: int
     links: tuple[EntryLink, ...]
     updated: str
-    live_url: str
+    missing: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,9 +205,11 @@ class AgentCard:
     task: str
     channel: str
     budget: str
-    tokens: str
-    success: str
-    figures: tuple[tuple[str, str], ...]
+    tokens: int
+    tokens_used: int
+    tokens_null: int
+    figures: tuple[Figure, ...]
+    conditions: tuple[Condition, ...]
     sha256: str
     url: str
 
@@ -219,7 +220,17 @@ class AgentsPage:
     frame: Frame
     agents: tuple[AgentCard, ...]
     errors: tuple[str, ...]
-    folder: str
+
+
+@dataclass(frozen=True, slots=True)
+class AgentPage:
+    template: ClassVar[str] = "admin/agent.html"
+    frame: Frame
+    agent: AgentCard
+    facts: tuple[tuple[str, str], ...]
+    rows: int
+    columns: int
+    tokens: tuple[TokenMeaning, ...]
 
 
 @dataclass(frozen=True, slots=True)
