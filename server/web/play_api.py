@@ -11,6 +11,7 @@ from starlette.responses import Response
 
 from server.domain import canonical
 from server.services import enrol, play
+from server.services.play import PageChange
 from server.web.dependencies import CurrentLab
 from server.web.schemas import RoundBody, StepBody
 
@@ -31,8 +32,8 @@ def open_round(lab: CurrentLab, key: str, body: RoundBody) -> Response:
     """The round in hand, or after a finished one the next."""
     with lab.database.writing() as db:
         participant = enrol.participant_by_key(db, lab, key)
-        answer = play.open_round(db, lab, participant, body.after)
-    return json_answer(answer)
+        found = play.open_round(db, lab, participant, body.after)
+    return json_answer({"page": f"/p/{key}"} if isinstance(found, PageChange) else found)
 
 
 @router.post("/p/{key}/step", responses=ANSWERS, response_class=Response)

@@ -1,0 +1,82 @@
+"""What is told in the states that have no page of their own: each says what to do next."""
+
+from server.web.pages import MessagePage
+
+CONTACT = "If you think that this is a mistake, write to {contact}."
+KEEP = "You can close this window."
+
+
+def unknown_study() -> MessagePage:
+    return MessagePage(
+        "No study here",
+        "There is no study at this address",
+        ("Check the link: it may have been cut off. Open the one from your invitation again.",),
+        "warn",
+    )
+
+
+def unknown_session() -> MessagePage:
+    return MessagePage(
+        "No session here",
+        "This link does not lead to a session",
+        (
+            "It may have been cut off when it was copied.",
+            "Open the link from your invitation again; it brings you back to where you were.",
+        ),
+        "warn",
+    )
+
+
+def preview(title: str) -> MessagePage:
+    return MessagePage(
+        title,
+        "This is a preview",
+        (
+            "Accept the task on the site that brought you here; the study then starts in this place.",
+            "Nothing is recorded in a preview.",
+        ),
+        "info",
+    )
+
+
+def full(title: str, contact: str) -> MessagePage:
+    return MessagePage(
+        title,
+        "All places are taken",
+        (
+            "Thank you for your interest. Enough people take part already. Nothing about you has been kept.",
+            "If a recruitment site sent you, return your place there; that has no consequences for you.",
+            CONTACT.format(contact=contact),
+        ),
+        "info",
+    )
+
+
+def paused(title: str, contact: str) -> MessagePage:
+    return MessagePage(
+        title,
+        "This study is paused",
+        (
+            "Nobody can start at the moment. Open the same link again later.",
+            "If you have started already, use the same browser and the same link as then.",
+            CONTACT.format(contact=contact),
+        ),
+        "wait",
+    )
+
+
+def closed(title: str, contact: str) -> MessagePage:
+    return MessagePage(
+        title,
+        "This study has ended",
+        (
+            "Thank you for your interest. No more people are needed, and nothing about you has been kept.",
+            "If a recruitment site sent you, return your place there.",
+            CONTACT.format(contact=contact),
+        ),
+        "info",
+    )
+
+
+def declined(title: str, text: str) -> MessagePage:
+    return MessagePage(title, "You do not take part", (text,), "good")

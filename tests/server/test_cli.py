@@ -1,0 +1,129 @@
+"""The command line as a user types it: exit codes, one-line refusals, and what init leaves behind."""
+
+import socket
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from server.cli import MODELS_COMMANDS
+
+REPOSITORY = Path(__file__).parents[2]
+PASSWORD = "correct horse"
+
+
+class Shell:
+    """Runs `hatlab` in its own process against a database in a folder of its own."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.settings = {"HATLAB_DATABASE_URL": f"sqlite:///{folder}/var/hatlab.sqlite3"}
+
+    def __call__(self, *words: str, **settings: str) -> subprocess.CompletedProcess[str]:
+        code = "from server.cli import main; main()"
+        return subprocess.run(
+            [sys.executable, "-c", code, *words],
+            cwd=self.folder,
+            env={"PYTHONPATH": str(REPOSITORY), "PATH": "/usr/bin:/bin", **self.settings, **settings},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=120,
+        )
+
+
+@pytest.fixture(name="hatlab")
+def shell_in_an_empty_folder(tmp_path: Path) -> Shell:
+    return Shell(tmp_path)
+
+
+def test_init_makes_two_studies_and_a_password_once(hatlab: Shell) -> None:
+    first = hatlab("init")
+    assert first.returncode == 0, first.stderr
+    assert "parent-child" in first.stdout
+    assert "traffic-junction" in first.stdout
+    assert "admin password" in first.stdout
+    second = hatlab("init")
+    assert second.returncode == 0
+    assert "study made" not in second.stdout
+    assert "password" not in second.stdout
+
+
+def test_a_password_from_the_environment_is_not_printed(hatlab: Shell) -> None:
+    done = hatlab("init", HATLAB_ADMIN_PASSWORD=PASSWORD)
+    assert done.returncode == 0
+    assert "admin password" not in done.stdout + done.stderr
+    assert PASSWORD not in done.stdout + done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("nonsense",), "No such command"),
+        (("export",), "Missing argument"),
+        (("serve", "--port", "abc"), "--port"),
+        (("serve",), "run `hatlab init`"),
+        (("verify",), "run `hatlab init`"),
+        (("export", "parent-child", "--out", "x"), "run `hatlab init`"),
+        (("simulate", "parent-child", "--participants", "1", "--seed", "1"), "run `hatlab init`"),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(hatlab: Shell, words: tuple[str, ...], said: str) -> None:
+    done = hatlab(*words)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert said in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("HATLAB_TRIAL_CACHE", "-1"),
+        ("HATLAB_ADMIN_PASSWORD", "short"),
+        ("HATLAB_DATABASE_URL", "mysql://x/y"),
+        ("HATLAB_DATABASE_URL", "secret-typed-in-the-wrong-place"),
+    ],
+)
+def test_a_setting_that_cannot_be_used_is_named_but_not_repeated(
+    hatlab: Shell, name: str, value: str
+) -> None:
+    done = hatlab("init", **{name: value})
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert value not in done.stderr
+
+
+def test_an_unknown_study_is_named(hatlab: Shell) -> None:
+    assert hatlab("init").returncode == 0
+    done = hatlab("export", "nobody", "--out", "x")
+    assert done.returncode == 2
+    assert "nobody" in done.stderr
+
+
+def test_a_port_that_is_taken_is_said_before_anything_starts(hatlab: Shell) -> None:
+    assert hatlab("init").returncode == 0
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        done = hatlab("serve", "--port", str(taken.getsockname()[1]))
+    assert done.returncode == 2
+    assert "choose another --port" in done.stderr
+
+
+def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:
+    done = hatlab("--help")
+    assert done.returncode == 0, done.stderr
+    for command in ("init", "serve", "verify", "export", "simulate", *MODELS_COMMANDS):
+        assert command in done.stdout
+
+
+def test_serving_never_loads_training(hatlab: Shell) -> None:
+    code = (
+        "import sys, server.cli, server.serving; "
+        "print(sorted(m for m in sys.modules if m.startswith(('models.training', 'models.interpret', "
+        "'models.evaluate', 'models.release', 'models.cli', 'server.simulate'))))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True, text=True, check=True, timeout=120
+    )
+    assert done.stdout.strip() == "[]"
