@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from models.policies.bundle import PolicyBundle
 
 SECRET = "secret_key"  # noqa: S105 the name of the row, not the secret
+DEFINITIONS_KEPT = 64
 SEED_BITS = 53  # exact in JavaScript and in spreadsheets
 
 
@@ -41,6 +42,9 @@ class Lab:
     secret_key: str
     now: Callable[[], datetime] = clock
     cache: Recent = field(default_factory=lambda: Recent(0))
+    """Folded trials, by trial id and last digest."""
+    definitions: Recent = field(default_factory=lambda: Recent(DEFINITIONS_KEPT))
+    """Launched study versions, by id."""
 
     @classmethod
     def open(cls, settings: Settings) -> "Lab":
@@ -78,6 +82,19 @@ class Lab:
     def offers(self) -> dict[str, Offer]:
         """What a study may choose from."""
         return {name: offer_of(bundle) for name, bundle in self.bundles.items()}
+
+    def agent(self, name: str, sha256: str | None = None) -> "PolicyBundle":
+        """A loaded bundle; with `sha256` the very one that a stored trial was played with.
+
+        Raises:
+            NotReadyError: it is not loaded.
+        """
+        bundle = self.bundles.get(name)
+        if bundle is None:
+            raise NotReadyError(f"the agent {name} is not loaded: see `hatlab bundles`")
+        if sha256 not in {None, bundle.sha256}:
+            raise NotReadyError(f"the agent {name} is loaded, but not the one with sha256 {sha256}")
+        return bundle
 
     def now_utc(self) -> str:
         return canonical.utc_text(self.now())

@@ -1,0 +1,331 @@
+"""Coming in: what an entry link leads to, consent, and the draw of the arm in the transaction that ends it.
+
+One person per (study, marketplace, id), also when two tabs consent at once. A preview and a refusal leave no
+data. A person who is in stays in: pausing and closing stop newcomers only.
+"""
+
+import base64
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from itsdangerous import BadSignature, TimestampSigner
+
+from server.domain import allocation, canonical, participation
+from server.domain.allocation import Allocated
+from server.domain.errors import BadInputError, NotFoundError
+from server.domain.study import StudyDefinition
+from server.ghost import panel
+from server.recruitment import recognition
+from server.recruitment.arrival import Arrival
+from server.services.lab import Lab
+from server.services.pages import Page, advance, page_of
+from server.services.session import definition_of
+from server.storage import enrolments, participants, studies
+from server.storage.database import DbSession
+from server.storage.enrolments import AllocationRow, ConsentRow, IdentityRow
+from server.storage.participants import ParticipantRow
+from server.storage.studies import StudyRow, VersionRow
+
+__all__ = [
+    "Declined",
+    "DeviceReport",
+    "Enrolled",
+    "Entry",
+    "Page",
+    "advance",
+    "consent",
+    "entry",
+    "page_of",
+    "participant_by_key",
+]
+
+VISIT = "visit"
+"""Parameter of direct links.
+
+A random name for one visit to the entry page, so that a form sent twice makes one person.
+"""
+VISIT_BYTES = 16
+ROBOT_SIGNATURE_MAX_S = 3_600
+DEVICES = ("desktop", "tablet", "phone")
+UNKNOWN = "unknown"
+TEXT_MAX = 120
+
+EntryKind = Literal["consent", "resume", "preview", "full", "paused", "closed", "not_found"]
+Mode = Literal["live", "test", "robot"]
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """What an entry link leads to."""
+
+    kind: EntryKind
+    study: StudyDefinition | None = None
+    key: str | None = None
+    """Of the session to go on with (`resume`)."""
+    identifiers: Mapping[str, str] = field(default_factory=dict)
+    """Hidden fields of the consent form."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceReport:
+    """What the browser says about itself; empty without scripts."""
+
+    device: str = ""
+    """Device class: desktop, tablet or phone."""
+    browser: str = ""
+    viewport: str = ""
+
+    @property
+    def device_class(self) -> str:
+        return self.device if self.device in DEVICES else UNKNOWN
+
+
+@dataclass(frozen=True, slots=True)
+class Enrolled:
+    key: str
+
+
+@dataclass(frozen=True, slots=True)
+class Declined:
+    """Nothing was stored."""
+
+    study: StudyDefinition
+
+
+@dataclass(frozen=True, slots=True)
+class Visit:
+    """A study as somebody stands before it."""
+
+    row: StudyRow
+    version: VersionRow
+    study: StudyDefinition
+    arrival: Arrival
+    mode: Mode
+
+
+def entry(db: DbSession, lab: Lab, slug: str, params: Mapping[str, str], robot: str | None = None) -> Entry:
+    """What this link leads to. Writes nothing.
+
+    Raises:
+        BadInputError: `robot` is not the server's own signature of the study's name.
+    """
+    row = studies.by_slug(db, slug)
+    visit = visit_of(db, lab, row, params, robot) if row else None
+    if visit is None:
+        return Entry("not_found")
+    if known := known_key(db, lab, visit):
+        return Entry("resume", visit.study, known)
+    return Entry(kind_of(db, lab, visit), visit.study, identifiers=identifiers_of(visit.arrival))
+
+
+def consent(
+    db: DbSession,
+    lab: Lab,
+    slug: str,
+    params: Mapping[str, str],
+    *,
+    agree: bool,
+    device: DeviceReport,
+    robot: str | None = None,
+) -> Enrolled | Declined | Entry:
+    """End consent: take the person in and draw the arm, or keep nothing.
+
+    An `Entry` comes back where the study cannot take the person after all.
+
+    Raises:
+        NotFoundError: no such study.
+        BadInputError: as in `entry`.
+    """
+    row = studies.by_slug(db, slug)
+    if row is not None and agree:
+        row = studies.hold(db, row.id)  # who enrols next must see whom we count now
+    visit = visit_of(db, lab, row, params, robot) if row else None
+    if visit is None:
+        raise NotFoundError(f"there is no study {slug}")
+    if not agree:
+        return Declined(visit.study)
+    if known := known_key(db, lab, visit):
+        return Enrolled(known)
+    if (kind := kind_of(db, lab, visit)) != "consent":
+        return Entry(kind, visit.study)
+    return enrol(db, lab, visit, device)
+
+
+def participant_by_key(db: DbSession, lab: Lab, key: str) -> ParticipantRow:  # noqa: ARG001
+    """The participant whose address this is.
+
+    Raises:
+        NotFoundError: nobody's.
+    """
+    found = participants.by_key(db, canonical.sha256(key))
+    if found is None:
+        raise NotFoundError("there is no session at this address")
+    return found
+
+
+def visit_of(
+    db: DbSession, lab: Lab, row: StudyRow, params: Mapping[str, str], robot: str | None
+) -> Visit | None:
+    """None for a study that was never launched."""
+    version = studies.newest_version(db, row.id)
+    if version is None or row.status == "draft":
+        return None
+    mode: Mode = "live" if row.mode == "live" else "test"
+    if robot is not None:
+        check_robot(lab, row.slug, robot)
+        mode = "robot"
+    return Visit(row, version, definition_of(db, lab, version.id), arrival_of(params), mode)
+
+
+def check_robot(lab: Lab, slug: str, signature: str) -> None:
+    signer = TimestampSigner(lab.secret_key, salt="robot")
+    try:
+        signed = signer.unsign(signature, max_age=ROBOT_SIGNATURE_MAX_S).decode()
+    except BadSignature as error:
+        raise BadInputError("X-Hatlab-Robot: not signed by this server's key") from error
+    if signed != slug:
+        raise BadInputError("X-Hatlab-Robot: signed for another study")
+
+
+def arrival_of(params: Mapping[str, str]) -> Arrival:
+    """The marketplace's arrival; a direct one is named after its visit, which no marketplace names."""
+    arrival = recognition.recognise(params)
+    if arrival.external_id is not None or arrival.preview:
+        return arrival
+    visit = params.get(VISIT, "")
+    return Arrival(arrival.marketplace, visit if is_visit(visit) else None)
+
+
+def is_visit(text: str) -> bool:
+    try:
+        return len(base64.urlsafe_b64decode(text + "==")) == VISIT_BYTES
+    except ValueError:
+        return False
+
+
+def identifiers_of(arrival: Arrival) -> dict[str, str]:
+    if arrival.external_id is not None and arrival.parameters:
+        return dict(arrival.parameters)
+    return {VISIT: secrets.token_urlsafe(VISIT_BYTES)}
+
+
+def known_key(db: DbSession, lab: Lab, visit: Visit) -> str | None:
+    """The key of the session that this person has already begun."""
+    arrival = visit.arrival
+    if arrival.external_id is None:
+        return None
+    hashed = lab.external_hash(arrival.marketplace, arrival.external_id)
+    participant_id = enrolments.participant_of(db, visit.row.id, arrival.marketplace, hashed)
+    return lab.participant_key(participant_id) if participant_id else None
+
+
+def kind_of(db: DbSession, lab: Lab, visit: Visit) -> EntryKind:
+    if visit.row.status == "paused":
+        return "paused"
+    if visit.row.status == "closed":
+        return "closed"
+    if visit.arrival.preview:
+        return "preview"
+    counts = counts_of(db, lab, visit)
+    places = places_of(visit.study)
+    return "consent" if allocation.open_cells(places, visit.study.role_orders, counts) else "full"
+
+
+def counts_of(db: DbSession, lab: Lab, visit: Visit) -> dict[tuple[str, str, str], int]:
+    """Who holds a place, among people of the same mode: robots never mix with people."""
+    since = canonical.minutes_before(lab.now(), visit.study.lease_min)
+    cells = participants.holding_places(db, visit.row.id, visit.mode, since)
+    return {(cell.arm, cell.role_order, cell.device): cell.people for cell in cells}
+
+
+def places_of(study: StudyDefinition) -> dict[str, int]:
+    return {arm.name: arm.places for arm in study.arms}
+
+
+def enrol(db: DbSession, lab: Lab, visit: Visit, device: DeviceReport) -> Enrolled | Entry:
+    """Draw the arm and write everything that consent begins."""
+    participant_id = new_id()
+    seed = lab.seed(participant_id)
+    counts = counts_of(db, lab, visit)
+    places, orders = places_of(visit.study), visit.study.role_orders
+    drawn = allocation.allocate(places, orders, device.device_class, counts, seed)
+    if drawn is None:
+        return Entry("full", visit.study)
+    now_utc = lab.now_utc()
+    key = lab.participant_key(participant_id)
+    participants.add(db, participant_row(lab, visit, device, participant_id, seed, drawn))
+    enrolments.add(
+        db,
+        identity_row(lab, visit, participant_id),
+        ConsentRow(
+            participant_id, visit.study.consent_sha256, visit.study.texts.consent_version, "agreed", now_utc
+        ),
+        AllocationRow(
+            participant_id,
+            canonical.dumps([[*cell, people] for cell, people in sorted(counts.items())]),
+            canonical.dumps([drawn.arm, drawn.role_order, device.device_class]),
+            drawn.probability,
+            seed,
+            now_utc,
+        ),
+    )
+    return Enrolled(key)
+
+
+def participant_row(
+    lab: Lab, visit: Visit, device: DeviceReport, participant_id: str, seed: int, drawn: Allocated
+) -> ParticipantRow:
+    places, numbers = sign_permutations(lab, visit.study, drawn.arm, seed)
+    now_utc = lab.now_utc()
+    return ParticipantRow(
+        id=participant_id,
+        study_id=visit.row.id,
+        study_version_id=visit.version.id,
+        mode=visit.mode,
+        key_sha256=canonical.sha256(lab.participant_key(participant_id)),
+        marketplace=visit.arrival.marketplace,
+        arm=drawn.arm,
+        role_order=drawn.role_order,
+        token_permutation=canonical.dumps(places),
+        number_permutation=canonical.dumps(numbers),
+        device=device.device_class,
+        browser=device.browser[:TEXT_MAX],
+        viewport=device.viewport[:TEXT_MAX],
+        status="active",
+        page=participation.plan(visit.study, drawn.role_order, seed).pages[0],
+        consented_utc=now_utc,
+        last_seen_utc=now_utc,
+        finished_utc=None,
+        completion_code=None,
+    )
+
+
+def sign_permutations(lab: Lab, study: StudyDefinition, arm: str, seed: int) -> tuple[list[int], list[int]]:
+    """Position of each token, and number at each position; empty where the study has no panel."""
+    if study.panel_bundle is None:
+        return [], []
+    tokens = lab.agent(study.panel_bundle).lexicon.tokens
+    communication = study.arm(arm).communication
+    return panel.token_places(communication, seed, tokens), panel.position_numbers(seed, tokens)
+
+
+def identity_row(lab: Lab, visit: Visit, participant_id: str) -> IdentityRow:
+    """Nobody's own name is known of a direct visitor: it is the visit's, or drawn here."""
+    arrival = visit.arrival
+    external_id = arrival.external_id or secrets.token_urlsafe(VISIT_BYTES)
+    return IdentityRow(
+        participant_id=participant_id,
+        study_id=visit.row.id,
+        marketplace=arrival.marketplace,
+        external_id=external_id,
+        external_hash=lab.external_hash(arrival.marketplace, external_id),
+        submission_id=arrival.submission_id,
+        parameters=canonical.dumps(dict(arrival.parameters)),
+    )
+
+
+def new_id() -> str:
+    """P and 10 characters of base32: 50 random bits."""
+    return "P" + base64.b32encode(secrets.token_bytes(7)).decode()[:10]
