@@ -11,7 +11,7 @@ from fastapi.telemetry import TelemetryConfig
 
 from server.services.lab import Lab
 from server.settings import Settings
-from server.web import admin, errors, health, participant, play_api
+from server.web import admin, entry, errors, health, participant, play_api
 from server.web.security import BodyLimit, SecurityHeaders
 from server.web.static import VersionedFiles
 
@@ -42,7 +42,7 @@ def create_app(lab: Lab) -> FastAPI:
     )
     app.state.lab = lab
     errors.install(app)
-    for router in (play_api.router, participant.router, health.router, admin.router):
+    for router in (play_api.router, entry.router, participant.router, health.router, admin.router):
         app.include_router(router)
     app.mount("/static", VersionedFiles())
     return app

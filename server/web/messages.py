@@ -1,9 +1,18 @@
 """What is told in the states that have no page of their own: each says what to do next."""
 
+from server.domain.study import StudyDefinition
+from server.services.enrol import EntryKind
 from server.web.pages import MessagePage
 
 CONTACT = "If you think that this is a mistake, write to {contact}."
-KEEP = "You can close this window."
+
+
+def of_entry(kind: EntryKind, study: StudyDefinition) -> MessagePage:
+    """What is told to somebody whom the study cannot take."""
+    if kind == "preview":
+        return preview(study.title)
+    told = {"full": full, "paused": paused, "closed": closed}
+    return told[kind](study.title, study.contact)
 
 
 def unknown_study() -> MessagePage:

@@ -97,7 +97,7 @@ class CompletePage:
     template: ClassVar[str] = "participant/complete.html"
     title: str
     code: str
-    marketplace: Literal["prolific", "mturk", "direct"]
+    marketplace: str
     url: str | None
     rounds_stored: int
     rounds: int

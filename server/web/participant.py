@@ -1,4 +1,4 @@
-"""The participant's pages: entry and consent under `/s/{slug}`, the session under `/p/{key}`.
+"""The pages of a session, under `/p/{key}`.
 
 The server decides the state first and shows the page of that state, whatever was asked for.
 """

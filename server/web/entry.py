@@ -1,0 +1,158 @@
+"""Coming in: the entry link `/s/{slug}` and the consent form.
+
+A direct link names nobody, so a cookie brings the same browser back to its session. People from a marketplace
+are known by their id and get no cookie: the key in the path is all they need, also inside MTurk's frame.
+"""
+
+import re
+from collections.abc import Mapping
+from typing import Annotated
+
+from fastapi import APIRouter, Header, Request
+from starlette.responses import RedirectResponse, Response
+
+from server.domain.errors import NotFoundError
+from server.domain.study import StudyDefinition
+from server.recruitment import mturk
+from server.recruitment.recognition import recognise
+from server.services import enrol
+from server.services.enrol import Declined, DeviceReport, Enrolled, Entry
+from server.services.lab import Lab
+from server.web import messages
+from server.web.dependencies import CurrentLab, Fields
+from server.web.pages import ConsentPage
+from server.web.rendering import html
+
+router = APIRouter()
+
+SLUG = re.compile(r"[a-z0-9-]{1,64}")
+PLAIN = re.compile(r"[^\x00-\x1f\x7f]{0,500}")  # a control character in a value is nobody's typing
+COOKIE_S = 30 * 86_400
+TICK_FIRST = "Please tick the box first: it says that you have read this page and agree."
+Robot = Annotated[str | None, Header(alias="X-Hatlab-Robot", max_length=500)]
+
+
+@router.get("/s/{slug}")
+def entry_page(request: Request, lab: CurrentLab, slug: str, robot: Robot = None) -> Response:
+    """Where this link leads: to consent, back into a session, or to a message."""
+    params = plain(request.query_params)
+    if not SLUG.fullmatch(slug):
+        return html(messages.unknown_study(), 404)
+    with lab.database.reading() as db:
+        found = enrol.entry(db, lab, slug, params, robot)
+    if found.kind == "consent" and (key := remembered(request, lab, slug, params)):
+        return RedirectResponse(f"/p/{key}", 303)
+    return page_of_entry(found, slug, params)
+
+
+@router.post("/s/{slug}/consent")
+def give_consent(
+    request: Request, lab: CurrentLab, slug: str, fields: Fields, robot: Robot = None
+) -> Response:
+    """The end of consent: into the session, or nothing is kept."""
+    params, agree = plain(fields), fields.get("agree")
+    if not SLUG.fullmatch(slug):
+        return html(messages.unknown_study(), 404)
+    if agree != "no" and (agree != "yes" or params.get("read") != "yes"):
+        return unticked(lab, slug, params, robot)
+    device = DeviceReport(params.get("device", ""), params.get("browser", ""), params.get("viewport", ""))
+    try:
+        with lab.database.writing() as db:
+            done = enrol.consent(db, lab, slug, params, agree=agree == "yes", device=device, robot=robot)
+    except NotFoundError:
+        return html(messages.unknown_study(), 404)
+    if isinstance(done, Enrolled):
+        return into_session(request, lab, slug, params, done.key)
+    if isinstance(done, Declined):
+        said = messages.declined(done.study.title, done.study.texts.declined)
+        return html(said, frames=frames(params))
+    return page_of_entry(done, slug, params)
+
+
+def into_session(request: Request, lab: Lab, slug: str, params: Mapping[str, str], key: str) -> Response:
+    response = RedirectResponse(f"/p/{key}", 303)
+    if recognise(params).marketplace == "direct":
+        response.set_cookie(
+            cookie_name(slug),
+            key,
+            max_age=COOKIE_S,
+            path=f"/s/{slug}",
+            secure=lab.settings.behind_https or request.url.scheme == "https",
+            httponly=True,
+            samesite="lax",
+        )
+    return response
+
+
+def remembered(request: Request, lab: Lab, slug: str, params: Mapping[str, str]) -> str | None:
+    """The key of the session that this browser began by the direct link."""
+    key = request.cookies.get(cookie_name(slug), "")
+    if not key or recognise(params).marketplace != "direct":
+        return None
+    try:
+        with lab.database.reading() as db:
+            enrol.participant_by_key(db, lab, key)
+    except NotFoundError:
+        return None
+    return key
+
+
+def unticked(lab: Lab, slug: str, params: Mapping[str, str], robot: str | None) -> Response:
+    """The consent page again, with what is missing; the visit keeps its name."""
+    with lab.database.reading() as db:
+        found = enrol.entry(db, lab, slug, params, robot)
+    if found.kind != "consent":
+        return page_of_entry(found, slug, params)
+    kept = {name: params.get(name, value) for name, value in found.identifiers.items()}
+    return html(consent_page(found, slug, kept, TICK_FIRST), 422, frames=frames(params))
+
+
+def page_of_entry(found: Entry, slug: str, params: Mapping[str, str]) -> Response:
+    if found.key is not None:
+        return RedirectResponse(f"/p/{found.key}", 303)
+    if found.study is None:
+        return html(messages.unknown_study(), 404)
+    if found.kind == "consent":
+        page = consent_page(found, slug, found.identifiers)
+        return html(page, frames=frames(params))
+    return html(messages.of_entry(found.kind, found.study), frames=frames(params))
+
+
+def consent_page(
+    found: Entry, slug: str, identifiers: Mapping[str, str], error: str | None = None
+) -> ConsentPage:
+    study = found.study
+    assert study is not None
+    return ConsentPage(
+        study_title=study.title,
+        welcome=study.texts.welcome,
+        paragraphs=study.texts.consent,
+        agree_text=study.texts.agree,
+        contact=study.contact,
+        facts=facts(study),
+        identifiers=identifiers,
+        action=f"/s/{slug}/consent",
+        error=error,
+    )
+
+
+def facts(study: StudyDefinition) -> tuple[tuple[str, str], ...]:
+    return (
+        ("Time", f"about {study.duration_min} minutes"),
+        ("Payment", study.reward_text),
+        ("You need", "a computer with a keyboard"),
+    )
+
+
+def frames(params: Mapping[str, str]) -> tuple[str, ...]:
+    """Who may embed the page: MTurk its own workers'."""
+    return mturk.FRAME_HOSTS if recognise(params).marketplace == "mturk" else ()
+
+
+def plain(values: Mapping[str, str]) -> dict[str, str]:
+    """The values that somebody can have typed or a marketplace sent."""
+    return {name: value for name, value in values.items() if PLAIN.fullmatch(value)}
+
+
+def cookie_name(slug: str) -> str:
+    return f"hatlab-{slug}"
