@@ -100,6 +100,8 @@ class Phase(_Strict):
     """Gradient steps at most."""
     episodes: Count = 64
     """Episodes per update."""
+    window: Annotated[int, Field(ge=0)] = 0
+    """Imitation: steps of the world between gradient steps, the memory carried over; 0 is the whole episode."""
     lr: Annotated[float, Field(gt=0)] = 1e-3
     """Learning rate of Adam at the start."""
     lr_end: Annotated[float, Field(gt=0)] | None = None
@@ -154,6 +156,8 @@ class Phase(_Strict):
             raise ValueError(f"gate {self.gate!r} needs a budget")
         if self.kind == "imitate" and self.gate in ("rewarded", "enforced"):
             raise ValueError(f"gate {self.gate!r} changes the reward, which imitation has none of; use budget")
+        if self.kind == "reinforce" and self.window:
+            raise ValueError("window is for imitation; the policy gradient needs whole episodes")
         if self.kind == "reinforce" and not self.sampled:
             raise ValueError("the policy gradient needs sampled actions")
         return self

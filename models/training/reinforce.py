@@ -68,15 +68,11 @@ def gradient_loss(
         enforcer: the controller, in an enforced phase.
         labels: (M,) actions of the rule, for imitation.
     """
-    rewards = shaped(env, seen, phase, enforcer)
-    value = learner.critic(seen.features.detach() if phase.kind == "imitate" else seen.features).squeeze(1)
-    advantage = advantages(rewards, grid(value.detach().numpy(), seen), seen.continues, phase.gamma, phase.lam)
-    target = torch.from_numpy(advantage.reshape(len(rewards), -1)[seen.step, seen.place]) + value.detach()
-    parts = {"value": (value - target).square().mean() * phase.value_weight}
+    parts: dict[str, Tensor] = {}
+    if phase.kind == "reinforce":
+        parts |= _policy_parts(env, learner, seen, phase, entropy_weight, enforcer)
     if phase.discrete:
         parts["channel"] = seen.channel_loss
-    if phase.kind == "reinforce":
-        parts |= _policy_parts(seen, target - value.detach(), phase, entropy_weight)
     if labels is not None:
         weight = phase.policy_weight if phase.kind == "imitate" else phase.imitation_weight
         parts["imitation"] = weight * imitation_loss(seen.logits, torch.from_numpy(labels), phase.brake_weight)
@@ -88,14 +84,27 @@ def gradient_loss(
     return Losses(total, {name: float(part.detach()) for name, part in parts.items()})
 
 
-def _policy_parts(seen: Unrolled, advantage: Tensor, phase: Phase, entropy_weight: float) -> dict[str, Tensor]:
-    advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-6)
+def _policy_parts(
+    env: Environment[Any],
+    learner: Learner,
+    seen: Unrolled,
+    phase: Phase,
+    entropy_weight: float,
+    enforcer: Enforcer | None,
+) -> dict[str, Tensor]:
+    value = learner.critic(seen.features).squeeze(1)
+    baseline = value.detach()
+    rewards = shaped(env, seen, phase, enforcer)
+    each = advantages(rewards, grid(baseline.numpy(), seen), seen.continues, phase.gamma, phase.lam)
+    raw = torch.from_numpy(each.reshape(len(rewards), -1)[seen.step, seen.place])  # (M,)
+    advantage = (raw - raw.mean()) / (raw.std() + 1e-6)
     log = seen.logits.log_softmax(1)
     chosen = log.gather(1, seen.action.unsqueeze(1)).squeeze(1)
     entropy = -(log.exp() * log).sum(1).mean()
     parts = {
         "policy": -phase.policy_weight * (advantage * chosen).mean(),
         "entropy": -entropy_weight * entropy,
+        "value": phase.value_weight * (value - baseline - raw).square().mean(),
     }
     if phase.gate != "open":
         gate = seen.gate.detach()

@@ -8,6 +8,7 @@ import csv
 import hashlib
 import json
 import time
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,7 +35,7 @@ from models.training.imitation import labels
 from models.training.quantise import kmeans, revived
 from models.training.reinforce import Learner, gradient_loss, shares
 from models.training.situations import OVERRIDES, beginning, check_seeds, generator, uniforms
-from models.training.unroll import Manner, Unrolled, unroll
+from models.training.unroll import Beginning, Manner, Unrolled, unroll
 
 LOG = "log.csv"
 COLUMNS = (
@@ -197,8 +198,8 @@ class Trainer:
         if not isinstance(channel, PrototypeChannel):
             return
         continuous = self.phase.model_copy(update={"discrete": False})
-        seen = [self._unroll(continuous, self.at.total + number)[0] for number in range(CODEBOOK_BATCHES)]
-        raw = [one.raw[torch.from_numpy(np.flatnonzero(one.uttered))] for one in seen]
+        updates = range(self.at.total, self.at.total + CODEBOOK_BATCHES)
+        raw = [one.raw[_uttered(one)] for update in updates for one, _ in self._windows(continuous, update)]
         draws = generator(self.recipe.seed, self.at.total)
         channel.codebook.copy_(kmeans(torch.cat(raw), self.recipe.model.tokens, draws))
 
@@ -208,17 +209,20 @@ class Trainer:
         """One update, and whatever is due after it: check, revival, next phase, end."""
         begun = time.perf_counter()
         phase = self.phase
-        seen, rule = self._unroll(phase, self.at.total)
         entropy = between(phase.entropy, phase.entropy_end, self.at, phase)
-        loss = gradient_loss(self.env, self.learner, seen, phase, entropy, self.enforcer, rule)
-        if not torch.isfinite(loss.total):
-            raise TrainingError(f"loss is {float(loss.total)} in phase {phase.name!r}; {self._last_good()}")
-        self._descend(loss.total)
-        self._losses = loss.parts
-        if self.enforcer is not None:
-            self.enforcer = self.enforcer.after(shares(seen))
+        steps = 0
+        for seen, rule in self._windows(phase, self.at.total):
+            loss = gradient_loss(self.env, self.learner, seen, phase, entropy, self.enforcer, rule)
+            if not torch.isfinite(loss.total):
+                raise TrainingError(f"loss is {float(loss.total)} in phase {phase.name!r}; {self._last_good()}")
+            self._descend(loss.total)
+            self._losses = loss.parts
+            if self.enforcer is not None:
+                self.enforcer = self.enforcer.after(shares(seen))
+            self._count(seen)
+            steps += int((~np.stack([self.env.done(s) for s in seen.states[:-1]])).sum())
         self._revive(seen)
-        self.at = self.at.updated(int((~np.stack([self.env.done(s) for s in seen.states[:-1]])).sum()))
+        self.at = self.at.updated(steps)
         self._seconds += time.perf_counter() - begun
         if self.at.update % self.recipe.check.every == 0 or self.at.ends(phase):
             self._check()
@@ -237,30 +241,35 @@ class Trainer:
             torch.nn.utils.clip_grad_norm_(part.parameters(), phase.clip)
         self.optimiser.step()
 
-    def _unroll(self, phase: Phase, update: int) -> tuple[Unrolled, NDArray[np.int64] | None]:
-        """Play the episodes of one update; with the rule's actions (M,) where they are asked for."""
-        recipe = self.recipe
+    def _windows(self, phase: Phase, update: int) -> Iterator[tuple[Unrolled, NDArray[np.int64] | None]]:
+        """Play the episodes of one update, window by window, with the rule's actions (M,) where they are asked for."""
+        recipe, steps_max = self.recipe, self.env.steps_max
         manner = Manner(phase.discrete, phase.sampled, phase.explore, phase.gate == "open")
         draws = generator(recipe.seed, update)
         begin = beginning(
             self.env, self.learner.net, recipe.start, manner, phase.episodes, recipe.seed, update, draws
         )
         override = _Overrides(self.env, recipe, phase, self.at, update)
-        seen = unroll(self.env, self.learner.net, begin, manner, draws, override if override.needed else None)
-        rule = np.stack(override.labels).reshape(len(override.labels), -1) if override.labels else None
-        return seen, None if rule is None else rule[seen.step, seen.place].astype(np.int64)
+        for first in range(0, steps_max, phase.window or steps_max):
+            steps = range(first, min(first + (phase.window or steps_max), steps_max))
+            seen = unroll(self.env, self.learner.net, begin, manner, draws, override.use, steps)
+            yield seen, override.rows(seen)
+            begin = Beginning(seen.states[-1], seen.memory)
+
+    def _count(self, seen: Unrolled) -> None:
+        """Count the prototypes in use."""
+        if isinstance(self.learner.net.channel, PrototypeChannel):
+            self._uses += torch.bincount(seen.token[_uttered(seen)], minlength=len(self._uses))
 
     @torch.no_grad()
     def _revive(self, seen: Unrolled) -> None:
         channel, phase = self.learner.net.channel, self.phase
         if not isinstance(channel, PrototypeChannel) or not phase.discrete or not phase.revive_every:
             return
-        uttered = torch.from_numpy(np.flatnonzero(seen.uttered))
-        self._uses += torch.bincount(seen.token[uttered], minlength=len(self._uses))
         early = self.at.update < 0.8 * phase.updates  # what is revived must have time to find its meaning
         if early and (self.at.update + 1) % phase.revive_every == 0:
             draws = generator(self.recipe.seed + 1, self.at.total)
-            channel.codebook.copy_(revived(channel.codebook, self._uses, seen.raw[uttered], draws))
+            channel.codebook.copy_(revived(channel.codebook, self._uses, seen.raw[_uttered(seen)], draws))
             self._uses.zero_()
 
     # -- checks ------------------------------------------------------------------------------------------------------
@@ -398,7 +407,14 @@ class _Overrides:
         draws = uniforms(recipe.seed, OVERRIDES, update, batch * (steps + 1)).reshape(steps + 1, batch)
         self._ruled = draws[0] < rule_share(at, phase)  # (B,)
         self._wobbles = draws[1:] < recipe.start.wobble  # (T, B)
-        self.needed = self._wants_labels or bool(recipe.start.wobble)
+        self.use = self if self._wants_labels or recipe.start.wobble else None
+
+    def rows(self, seen: Unrolled) -> NDArray[np.int64] | None:
+        """The rule's actions (M,) in the window that was just played."""
+        if not self._wants_labels:
+            return None
+        rule = np.stack(self.labels[-len(seen.living) :])  # (T, B, N)
+        return rule.reshape(len(rule), -1)[seen.step, seen.place].astype(np.int64)
 
     def __call__(self, step: int, state: Any, actions: NDArray[np.int32]) -> NDArray[np.int32]:
         assert isinstance(self._env, TrafficJunction)
@@ -411,6 +427,11 @@ class _Overrides:
             actions = actions.copy()
             actions[wobbling, state.guest[wobbling]] = BRAKE
         return actions
+
+
+def _uttered(seen: Unrolled) -> Tensor:
+    """Rows whose message can be heard."""
+    return torch.from_numpy(np.flatnonzero(seen.uttered))
 
 
 def fingerprint(recipe: Recipe) -> str:

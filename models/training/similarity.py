@@ -18,6 +18,8 @@ from models.training.config import Decoder
 from models.training.imitation import intent
 from models.training.unroll import Unrolled
 
+RARE = -2.5  # first logit of a cell being occupied: about 1 in 12, as on medium
+
 
 class Reader(nn.Module):
     """Predicts the target from the inbox, or from [second hidden, inbox]."""
@@ -30,6 +32,10 @@ class Reader(nn.Module):
             self.read: nn.Module = nn.Linear(message, size)
         else:
             self.read = nn.Sequential(nn.Linear(hidden + message, hidden), nn.ReLU(), nn.Linear(hidden, size))
+
+        if settings.target == "occupancy":
+            last = self.read if isinstance(self.read, nn.Linear) else self.read[-1]
+            nn.init.constant_(last.bias, RARE)
 
     def forward(self, hidden: Tensor, inbox: Tensor) -> Tensor:
         heard = inbox if self.settings.reads == "inbox" else torch.cat((hidden, inbox), 1)

@@ -80,6 +80,8 @@ class Unrolled(NamedTuple):
     """(T, B, N)"""
     states: tuple[Any, ...]
     """T + 1 states"""
+    memory: Tensor
+    """(B*N, memory) after the last step, without gradient"""
 
 
 class Mind:
@@ -154,8 +156,9 @@ def unroll(
     manner: Manner,
     generator: torch.Generator,
     override: Override | None = None,
+    steps: range | None = None,
 ) -> Unrolled:
-    """Play ``steps_max`` steps of B episodes; gradients flow from every row to every message before it."""
+    """Play B episodes, or a window of their steps; gradients flow from every row to every message before it."""
     state = beginning.state
     batch = len(env.done(state))
     mind = Mind(env, net, batch, manner)
@@ -163,7 +166,7 @@ def unroll(
         mind.remember(beginning.memory)
     rows: list[_Rows] = []
     states, rewards, living = [state], [], []
-    for step in range(env.steps_max):
+    for step in steps or range(env.steps_max):
         here = env.alive(state) & ~env.done(state)[:, None]
         actions, found = _step(mind, state, here, generator, step, override)
         rows.append(found)
@@ -171,7 +174,7 @@ def unroll(
         state, reward = env.step(state, actions)
         rewards.append(reward)
         states.append(state)
-    return _collect(env, rows, living, rewards, states)
+    return _collect(env, rows, living, rewards, states, mind.memories().detach(), steps.start if steps else 0)
 
 
 class _Rows(NamedTuple):
@@ -219,7 +222,8 @@ def _choose(logits: Tensor, manner: Manner, generator: torch.Generator) -> Tenso
 
 
 def _collect(
-    env: Environment[Any], rows: list[_Rows], living: list[Bools], rewards: list[NDArray[np.float32]], states: list[Any]
+    env: Environment[Any], rows: list[_Rows], living: list[Bools], rewards: list[NDArray[np.float32]], states: list[Any],
+    memory: Tensor, first: int,
 ) -> Unrolled:
     features = torch.cat([r.features for r in rows])
     hidden = rows[0].said.memory.shape[1] // 5
@@ -228,7 +232,7 @@ def _collect(
     losses = torch.cat([r.said.loss for r in rows])[torch.from_numpy(np.flatnonzero(uttered))]
     after = [env.alive(s) & ~env.fresh(s) & ~env.done(s)[:, None] for s in states[1:]]
     return Unrolled(
-        step=step,
+        step=step - first,
         place=place,
         logits=torch.cat([r.logits for r in rows]),
         action=torch.cat([r.action for r in rows]),
@@ -245,6 +249,7 @@ def _collect(
         continues=np.stack([now & then for now, then in zip(living, after, strict=True)]),
         rewards=np.stack(rewards),
         states=tuple(states),
+        memory=memory,
     )
 
 
