@@ -54,7 +54,7 @@ def information(lexicon: Lexicon) -> Information:
     )
 
 
-def in_use(uses: NDArray[np.int64]) -> NDArray[np.bool_]:
+def in_use(uses: NDArray[np.int64] | NDArray[np.float64]) -> NDArray[np.bool_]:
     """Return which tokens (…, K) are in use: 1 % of the messages, or a tenth of an even share if less.
 
     Nine tokens need 1 % each; of 100 tokens, each with an even share of 1 %, one counts from 0.1 % on.

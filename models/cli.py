@@ -1,0 +1,314 @@
+"""`hatlab train | evaluate | interpret | release | bundles`: the commands of the science.
+
+Exit code 0: done; 1: a check failed (a broken bundle); 2: bad input, one line on standard error. Mounted by
+`server.cli`, which imports this module only when one of the commands is asked for.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn
+
+import typer
+
+from models.envs import registry
+from models.policies import bundle, scripted
+
+if TYPE_CHECKING:
+    from models.envs.api import Environment
+    from models.evaluate import Measure
+    from models.interpret.summary import Meaning
+    from models.policies.bundle import PolicyBundle
+
+PACKAGE = Path(__file__).parent
+BUNDLES, RECIPES = PACKAGE / "bundles", PACKAGE / "recipes"
+BROKEN, BAD_INPUT = 1, 2
+
+
+class Start(StrEnum):
+    """Situations in which episodes begin."""
+
+    INIT = "init"
+    HUMAN = "human"
+
+
+app = typer.Typer(
+    add_completion=False, no_args_is_help=True, rich_markup_mode=None, pretty_exceptions_enable=False
+)
+
+BundleArgument = Annotated[
+    str, typer.Argument(metavar="BUNDLE", help="Name, such as parent_child/prototype-9, or a folder.")
+]
+BundlesOption = Annotated[
+    Path, typer.Option("--bundles", help="Folder of bundles.", show_default="the packaged ones")
+]
+SeedOption = Annotated[
+    int, typer.Option(min=0, help="Seed of the episodes; the same seed, the same numbers.")
+]
+
+
+@app.callback()
+def models() -> None:
+    """Train, measure and read agents."""
+
+
+@app.command()
+def train(
+    recipe: Annotated[
+        str, typer.Argument(metavar="RECIPE", help="TOML file, or the name of a packaged one.")
+    ],
+    out: Annotated[Path | None, typer.Option(help="Folder of the run; runs/<recipe> if absent.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")
+    ] = False,
+    seed: Annotated[int | None, typer.Option(min=0, help="Another seed than the recipe's.")] = None,
+    bundles: BundlesOption = BUNDLES,
+) -> None:
+    """Train what a recipe describes; RUN_DIR then holds log.csv, the recipe and the checkpoint."""
+    from models import release as releasing
+    from models import training
+    from models.training.checkpoint import CheckpointError
+
+    source = _recipe_path(recipe)
+    folder = out or Path("runs") / source.stem
+    try:
+        training.config.load(source)
+        own = _own_recipe(source, folder, seed, resume)
+        if not resume:
+            releasing.Provenance.here().write(folder)
+        result = training.run(own, folder, resume=resume, bundles=bundles)
+    except (training.RecipeError, training.TrainingError, CheckpointError) as error:
+        _refuse(error)
+    typer.echo(
+        f"{result.updates:,} updates, {result.steps:,} environment steps, best score {result.score:.4f}"
+    )
+    typer.echo(f"release it with: hatlab release {folder} {result.recipe.name}")
+
+
+@app.command()
+def evaluate(
+    policy: Annotated[
+        str,
+        typer.Argument(
+            metavar="BUNDLE", help=f"Bundle (name or folder), or a rule: {', '.join(scripted.NAMES)}."
+        ),
+    ],
+    task: Annotated[
+        str | None, typer.Option(help=f"For a rule: {', '.join(registry.NAMES)}. A bundle has its own.")
+    ] = None,
+    episodes: Annotated[int, typer.Option(min=1, help="How many.")] = 1_000,
+    seed: SeedOption = 0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    sampled: Annotated[
+        bool, typer.Option("--sampled", help="Draw actions and gates instead of argmax.")
+    ] = False,
+    masked: Annotated[bool, typer.Option("--masked", help="Nobody hears anything.")] = False,
+    arrival: Annotated[
+        float | None, typer.Option(min=0, max=1, help="Probability of a car per entrance and step.")
+    ] = None,
+    start: Annotated[
+        Start, typer.Option(help="human: trials as participants get them, among 5 to 9 cars.")
+    ] = Start.INIT,
+    bundles: BundlesOption = BUNDLES,
+) -> None:
+    """Measure a bundle or a rule-based policy; every number with its 95 % interval."""
+    from models import evaluate as measuring
+
+    env, players = _players(policy, task, bundles, seed if sampled else None)
+    question = measuring.Question(episodes, seed, start.value, arrival, masked)
+    try:
+        measures = measuring.evaluate(env, players, question)
+    except (ValueError, scripted.WrongTaskError) as error:
+        _refuse(error)
+    asked = {
+        "policy": policy,
+        "task": env.name,
+        "episodes": episodes,
+        "seed": seed,
+        "start": start.value,
+        "arrival": arrival,
+        "sampled": sampled,
+        "masked": masked,
+    }
+    if as_json:
+        numbers = {name: measure.to_json() for name, measure in measures.items()}
+        typer.echo(json.dumps(asked | numbers))
+    else:
+        _print_measures(asked, measures)
+
+
+@app.command()
+def interpret(
+    name: BundleArgument,
+    out: Annotated[Path, typer.Option(help="Folder to write to.")],
+    episodes: Annotated[
+        int | None, typer.Option(min=1, help="Episodes to count in; the task's own number if absent.")
+    ] = None,
+    seed: SeedOption = 0,
+    png: Annotated[bool, typer.Option("--png", help="Write the figures as PNG too.")] = False,
+    bundles: BundlesOption = BUNDLES,
+) -> None:
+    """Estimate what a bundle's tokens mean: lexicon.json, summary.json and figures (SVG)."""
+    from models.interpret import figures
+    from models.interpret import summary as meaning_of
+
+    held = _bundle(name, bundles)
+    env = registry.make(held.manifest.task)
+    meaning = meaning_of.interpret(env, held.policy, seed, episodes)
+    out.mkdir(parents=True, exist_ok=True)
+    numbers = meaning_of.summary(meaning)
+    _write_json(out / "lexicon.json", meaning.lexicon.to_json())
+    _write_json(out / "summary.json", numbers)
+    charts = figures.figures(meaning.lexicon, meaning.distances, env.shape, meaning.calibration)
+    written = figures.write(charts, out, png=png)
+    _print_meaning(held, meaning, numbers)
+    typer.echo(f"written to {out}: lexicon.json, summary.json, {', '.join(path.name for path in written)}")
+
+
+@app.command()
+def release(
+    run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Folder of a finished hatlab train.")],
+    name: Annotated[
+        str | None, typer.Argument(metavar="NAME", help="Name of the bundle; the recipe's own if absent.")
+    ] = None,
+    episodes: Annotated[int, typer.Option(min=1, help="Episodes of each evaluation.")] = 5_000,
+    bundles: BundlesOption = BUNDLES,
+) -> None:
+    """Make a bundle of a run: weights, lexicon, evaluation, card."""
+    from models import release as releasing
+    from models.training import RecipeError, TrainingError
+    from models.training.checkpoint import CheckpointError
+
+    if name is not None and not bundle.NAME.fullmatch(name):
+        _refuse(f"name {name!r} is not of the form task_folder/name-1")
+    try:
+        made = releasing.release(run_dir, name, bundles, episodes)
+    except (releasing.ReleaseError, bundle.BundleError, RecipeError, TrainingError, CheckpointError) as error:
+        _refuse(error)
+    typer.echo(f"{bundles / made.name}: sha256 {made.sha256}")
+
+
+@app.command("bundles")
+def list_bundles(bundles: BundlesOption = BUNDLES) -> None:
+    """List and verify all bundles; exit 1 if any is broken."""
+    from rich.console import Console
+    from rich.table import Table
+
+    if not bundles.is_dir():
+        _refuse(f"{bundles}: no such folder")
+    found, errors = bundle.find(bundles)
+    table = Table("bundle", "task", "channel", "tokens", "gate", "budget", "sha256", box=None, pad_edge=False)
+    for held in found.values():
+        of = held.manifest
+        row = (
+            held.name,
+            of.task,
+            of.channel,
+            of.sizes["tokens"],
+            of.gate,
+            f"{of.budget:g}",
+            held.sha256[:12],
+        )
+        table.add_row(*map(str, row))
+    Console().print(table)
+    for line in errors:
+        typer.echo(line, err=True)
+    raise typer.Exit(BROKEN if errors else 0)
+
+
+def _refuse(reason: object) -> NoReturn:
+    """Say in one line what is wrong with the input, and leave."""
+    typer.echo(" ".join(str(reason).split()), err=True)
+    raise typer.Exit(BAD_INPUT)
+
+
+def _recipe_path(recipe: str) -> Path:
+    path, packaged = Path(recipe), RECIPES / f"{recipe}.toml"
+    if path.exists():
+        return path
+    if packaged.exists():
+        return packaged
+    known = ", ".join(sorted(file.stem for file in RECIPES.glob("*.toml")))
+    _refuse(f"{recipe}: no such file; packaged recipes: {known}")
+
+
+def _own_recipe(source: Path, folder: Path, seed: int | None, resume: bool) -> Path:
+    """Copy the recipe into the run's folder, with another seed if asked for; a resumed run keeps its own."""
+    own = folder / "recipe.toml"
+    if own.exists() and resume:
+        return own
+    if (folder / "checkpoint.safetensors").exists():
+        return own  # which the trainer refuses: the folder holds a run
+    folder.mkdir(parents=True, exist_ok=True)
+    shutil.copyfile(source, own)
+    if seed is not None:
+        text = own.read_text(encoding="utf-8")
+        own.write_text(re.sub(r"(?m)^seed\s*=.*$", f"seed = {seed}", text, count=1), encoding="utf-8")
+    return own
+
+
+def _bundle(name: str, root: Path) -> PolicyBundle:
+    folder = Path(name) if Path(name).is_dir() else root / name
+    if not folder.is_dir():
+        known = sorted(path.parent.relative_to(root).as_posix() for path in root.glob("*/*/manifest.json"))
+        _refuse(f"{name}: no such bundle; known ones: {', '.join(known) or 'none'}")
+    try:
+        return bundle.load(folder)
+    except bundle.BundleError as error:
+        _refuse(f"{name}/{error}")
+
+
+def _players(policy: str, task: str | None, root: Path, draws: int | None) -> tuple[Environment[Any], Any]:
+    """World and players of an evaluation."""
+    from models.policies.api import GeneratorDraws
+    from models.policies.team import Team
+
+    if policy.startswith("scripted:"):
+        if task is None:
+            _refuse(f"{policy} needs --task: one of {', '.join(registry.NAMES)}")
+        try:
+            return registry.make(task), scripted.make(policy)
+        except (registry.UnknownTaskError, scripted.UnknownScriptedError) as error:
+            _refuse(error)
+    held = _bundle(policy, root)
+    if task is not None and task != held.manifest.task:
+        _refuse(f"{held.name} was trained for {held.manifest.task}, not {task}; leave out --task")
+    env = registry.make(held.manifest.task)
+    return env, Team(env, held.policy, None if draws is None else GeneratorDraws(draws))
+
+
+def _write_json(path: Path, data: dict[str, Any]) -> None:
+    path.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _print_measures(asked: dict[str, Any], measures: dict[str, Measure]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    said = [f"{key} {value}" for key, value in asked.items() if value is not None and value is not False]
+    typer.echo(", ".join(said))
+    table = Table("measure", "mean", "95 % from", "to", box=None, pad_edge=False)
+    for name, measure in measures.items():
+        low, high = measure.ci95
+        table.add_row(name, f"{measure.mean:.4f}", f"{low:.4f}", f"{high:.4f}")
+    Console().print(table)
+
+
+def _print_meaning(held: PolicyBundle, meaning: Meaning, numbers: dict[str, Any]) -> None:
+    typer.echo(
+        f"{held.name}: {numbers['messages']:,} messages, "
+        f"{numbers['tokens_in_use']} of {numbers['tokens']} tokens in use, {numbers['null_tokens']} null"
+    )
+    if numbers["distance_r2"] is not None:
+        typer.echo(
+            f"distance against distance: r2 {meaning.distances.r2:.3f}, slope {meaning.distances.slope:.2f}"
+        )
+    for truth, judged in (meaning.calibration or {}).items():
+        typer.echo(
+            f"triangles ({truth}): calibration error {judged.ece:.3f}, Brier skill {judged.brier_skill:.2f}, "
+            f"coverage {judged.coverage:.2f}"
+        )
