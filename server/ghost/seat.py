@@ -31,6 +31,9 @@ class Minds(NamedTuple):
 class Crew(Protocol):
     """Fills every seat of one world (batch 1)."""
 
+    signs: int
+    """From how many blank signs a scripted child chooses; 0 for all others."""
+
     def begin(self, opening: Opening) -> Minds:
         """The minds as they come to the first state of the trial."""
         ...
@@ -46,6 +49,8 @@ class Crew(Protocol):
 
 class TrainedCrew:
     """A released policy in every seat."""
+
+    signs = 0
 
     def __init__(self, env: Environment[Any], policy: Policy) -> None:
         self.team = Team(env, policy)

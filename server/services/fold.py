@@ -43,12 +43,23 @@ def begin(lab: Lab, spec: TrialSpec) -> tuple[Running, Said]:
         NotReadyError: the trial's agent is not loaded.
     """
     env = registry.make(spec.task)
-    begun = opening(env, spec.start, np.array([spec.seed], np.uint64), spec.condition.arrival)
     crew, lexicon = crew_of(lab, spec)
-    said, minds = crew.speak(begun.state, crew.begin(begun))
+    world, said, minds = situation(lab, spec, crew)
     if spec.role == "child":
         said = events.silence(env.agents)  # the participant has not chosen yet
-    return Running(trial.begun(spec, env, begun.state), crew, minds, lexicon), said
+    return Running(trial.begun(spec, env, world), crew, minds, lexicon), said
+
+
+def situation(lab: Lab, spec: TrialSpec, crew: Crew) -> tuple[Any, Said, Minds]:
+    """The first state, what is said in it, and the minds after that; the same for everybody who plays it."""
+    key = (spec.task, spec.start, spec.seed, spec.condition.arrival, spec.bundle, spec.scripted, crew.signs)
+    known: tuple[Any, Said, Minds] | None = lab.openings.get(key)
+    if known is None:
+        seeds = np.array([spec.seed], np.uint64)
+        begun = opening(registry.make(spec.task), spec.start, seeds, spec.condition.arrival)
+        known = (begun.state, *crew.speak(begun.state, crew.begin(begun)))
+        lab.openings.put(key, known)
+    return known
 
 
 def crew_of(lab: Lab, spec: TrialSpec) -> tuple[Crew, Lexicon | None]:
@@ -75,10 +86,7 @@ def follow(running: Running, decision: Mapping[str, Any]) -> Running:
     """Go through a stored decision: the minds hear and see what was recorded."""
     running = choose(running, decision["token"])
     for move in events.moves_in(decision):
-        _, minds = running.crew.act(running.trial.world, running.minds, running.trial.said)
-        running = moved(running, minds, move.actions)
-        running, _ = listened(running)
-        running = replace(running, trial=trial.spoken(running.trial, move.said))
+        running, _ = step(running, None, recorded=move)
     return running
 
 
@@ -103,24 +111,22 @@ def choose(running: Running, token: int | None) -> Running:
     return running if token is None else replace(running, trial=trial.chosen(running.trial, token))
 
 
-def step(running: Running, action: int | None) -> tuple[Running, Move]:
-    """One world step: every seat acts, the participant's by `action`; then every seat speaks."""
+def step(running: Running, action: int | None, recorded: Move | None = None) -> tuple[Running, Move]:
+    """One world step: every seat acts, the participant's by `action`; then every seat speaks.
+
+    Where it is `recorded`, the world and the minds go on from the record.
+
+    Returns:
+        The trial after the step, and the step as the seats have it now.
+    """
     wanted, minds = running.crew.act(running.trial.world, running.minds, running.trial.said)
     if action is not None:
         wanted[running.trial.spec.seat] = action
-    running = moved(running, minds, tuple(wanted))
-    running, said = listened(running)
-    running = replace(running, trial=trial.spoken(running.trial, said))
-    return running, Move(tuple(wanted), said)
-
-
-def moved(running: Running, minds: Minds, actions: tuple[int, ...]) -> Running:
-    return replace(running, trial=trial.moved(running.trial, actions), minds=minds)
-
-
-def listened(running: Running) -> tuple[Running, Said]:
-    """What every seat says in the present state; nobody speaks any more once the trial is over."""
-    if running.trial.over:
-        return running, events.silence(running.trial.env.agents)
-    said, minds = running.crew.speak(running.trial.world, running.minds)
-    return replace(running, minds=minds), said
+    actions = tuple(wanted)
+    stepped = trial.moved(running.trial, recorded.actions if recorded else actions)
+    said = events.silence(stepped.env.agents)  # nobody speaks any more once the trial is over
+    if not stepped.over:
+        said, minds = running.crew.speak(stepped.world, minds)
+        said = stepped.held or said
+    stepped = trial.spoken(stepped, recorded.said if recorded else said)
+    return replace(running, trial=stepped, minds=minds), Move(actions, said)

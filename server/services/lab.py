@@ -45,6 +45,8 @@ class Lab:
     """Folded trials, by trial id and last digest."""
     definitions: Recent = field(default_factory=lambda: Recent(DEFINITIONS_KEPT))
     """Launched study versions, by id."""
+    openings: Recent = field(default_factory=lambda: Recent(0))
+    """Situations with a bundle's minds led into them: everybody plays the same ones."""
 
     @classmethod
     def open(cls, settings: Settings) -> "Lab":
@@ -76,6 +78,7 @@ class Lab:
             bundle_errors=(),
             secret_key=secret_of(settings, database),
             cache=Recent(settings.trial_cache),
+            openings=Recent(settings.trial_cache),
         )
 
     @cached_property

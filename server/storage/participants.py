@@ -38,6 +38,7 @@ class CellCount(NamedTuple):
     people: int
 
 
+ROWS_A_PAGE = 500
 PARTICIPANT = select(participant)
 BY_KEY = PARTICIPANT.where(participant.c.key_sha256 == bindparam("key_sha256"))
 SEEN = (
@@ -111,8 +112,14 @@ def holding_places(db: DbSession, study_id: int, mode: str, seen_since_utc: str)
 
 def stream(db: DbSession, study_id: int | None = None) -> Iterator[ParticipantRow]:
     """Every participant, of one study or of all, by id, with constant memory."""
-    statement = PARTICIPANT.order_by(participant.c.id).execution_options(yield_per=500)
+    after = ""
+    while page := next_page(db, study_id, after):
+        yield from page
+        after = page[-1].id
+
+
+def next_page(db: DbSession, study_id: int | None, after: str) -> list[ParticipantRow]:
+    statement = PARTICIPANT.where(participant.c.id > after).order_by(participant.c.id).limit(ROWS_A_PAGE)
     if study_id is not None:
         statement = statement.where(participant.c.study_id == study_id)
-    for row in db.read(statement):
-        yield ParticipantRow._make(row)
+    return [ParticipantRow._make(row) for row in db.read(statement)]
