@@ -1,0 +1,41 @@
+import numpy as np
+import pytest
+
+from models.interpret.correlation import distances, mean_locations
+from models.policies.lexicon import Lexicon
+
+CORNERS = np.zeros((4, 25), int)
+CORNERS[range(4), [0, 4, 20, 24]] = 100
+
+
+def lexicon(counts: np.ndarray = CORNERS) -> Lexicon:
+    return Lexicon.from_counts(counts, positions=np.full((len(counts), 2), 0.5))
+
+
+def test_the_mean_location_is_in_rows_and_columns() -> None:
+    assert mean_locations(lexicon(), (5, 5)).tolist() == [[0, 0], [0, 4], [4, 0], [4, 4]]
+
+
+def test_prototypes_laid_out_like_the_grid_correlate_perfectly() -> None:
+    found = distances(lexicon(), mean_locations(lexicon(), (5, 5)) * 0.5 + 3, (5, 5))
+    assert found.r2 == pytest.approx(1)
+    assert found.slope == pytest.approx(2)
+    assert found.intercept == pytest.approx(0)
+    assert len(found.pairs) == 6
+
+
+def test_equally_distant_prototypes_have_no_correlation_to_speak_of() -> None:
+    assert np.isnan(distances(lexicon(), np.eye(4), (5, 5)).r2)
+
+
+def test_r2_is_the_squared_pearson_correlation() -> None:
+    vectors = np.random.default_rng(3).normal(size=(4, 6))
+    found = distances(lexicon(), vectors, (5, 5))
+    assert found.r2 == pytest.approx(np.corrcoef(found.prototype, found.place)[0, 1] ** 2)
+    assert found.slope == pytest.approx(np.polyfit(found.prototype, found.place, 1)[0])
+
+
+def test_null_tokens_have_no_place_and_form_no_pairs() -> None:
+    counts = np.concatenate([CORNERS, np.zeros((2, 25), int)])
+    found = distances(lexicon(counts), np.random.default_rng(0).normal(size=(6, 2)), (5, 5))
+    assert found.pairs.max() == 3
