@@ -61,6 +61,16 @@ def test_two_adapters_that_were_never_seeded_differ() -> None:
     assert len(worlds) > 1
 
 
+def test_an_agent_without_an_action_takes_the_first_one() -> None:
+    worlds = []
+    for actions in ({}, {"seat_0": 0, "seat_1": 0}):
+        adapter = parallel_env("parent_child")
+        adapter.reset(seed=4)
+        worlds.append(adapter.step(actions)[0]["seat_0"])
+
+    assert np.array_equal(*worlds)
+
+
 def test_a_step_without_an_episode_is_refused() -> None:
     with pytest.raises(RuntimeError, match="call reset"):
         parallel_env("parent_child").step({})

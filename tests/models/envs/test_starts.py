@@ -9,6 +9,7 @@ from models.envs.registry import make
 from models.envs.right_of_way import right_of_way
 from models.envs.starts import HumanStart, human_start
 from models.envs.traffic_junction import BRAKE, GAS, NEVER, TrafficJunction, TrafficState
+from models.policies import scripted
 
 ENV = TrafficJunction("medium")
 B = 400
@@ -123,6 +124,20 @@ def test_a_warmup_that_takes_too_long_is_drawn_again(
     assert again.length.max() <= 14
     assert _equal(take(again.state, ~late), take(begun.state, ~late))
     assert (again.state.seed[late] != begun.state.seed[late]).all()
+
+
+def test_collisions_of_the_warmup_are_over_and_forgotten_when_the_participant_enters(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # the right-of-way rule hardly ever lets cars meet, random drivers do
+    monkeypatch.setattr(starts, "right_of_way", scripted.Random().actions)
+    wild = human_start(ENV, np.arange(100, dtype=np.uint64))
+    crashed = np.array([any(state.crashed[b] for state, _ in wild.warmup) for b in range(100)])
+
+    assert crashed.mean() > 0.5
+    assert not ENV.collided(wild.state).any()
+    assert not wild.state.collided_ever.any()
+    assert ENV.success(wild.state).all()
 
 
 def test_the_trial_goes_on_in_the_same_world_with_few_arrivals(begun: HumanStart) -> None:

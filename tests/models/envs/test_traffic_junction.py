@@ -162,6 +162,16 @@ def test_no_car_arrives_in_the_guests_cell_or_slot() -> None:
     assert (gone.fresh.sum(1) == 4).all()
 
 
+def test_no_car_arrives_when_only_the_guests_slot_is_empty() -> None:
+    nine = [(LEFT_STRAIGHT, position) for position in range(1, 10)]
+    state = _scene(*nine, arrival=1.0, seeds=20, guest=np.full(20, 9, np.int32))
+    after, _ = _go(state, *[BRAKE] * 9)
+
+    assert not after.fresh.any()
+    assert np.array_equal(after.position, state.position)
+    assert np.array_equal(after.route, state.route)
+
+
 def test_arrivals_stop_at_the_largest_number_of_cars() -> None:
     state = _scene((LEFT_STRAIGHT, 3), arrival=1.0, seeds=3, cars_max=np.array([1, 3, 10], np.int32))
     after, _ = _go(state, GAS)
