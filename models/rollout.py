@@ -1,7 +1,7 @@
-"""Episodes of any drivers or seekers in any world, batched: what training, evaluation and interpretation count from.
+"""Episodes of any drivers or seekers in any world, batched: what everything above counts from.
 
-Shapes by legend: T steps, B episodes, N seats. Everything that stands at step t was true, said or done in the state
-of step t; ``rewards`` are what the actions of step t led to.
+Shapes by legend: T steps, B episodes, N seats. Everything that stands at step t was true, said or done in the
+state of step t; ``rewards`` are what the actions of step t led to.
 """
 
 from dataclasses import dataclass
@@ -45,7 +45,9 @@ class Rollout:
     rewards: NDArray[np.float32]
     """(T, B, N)"""
     collided: Bools
-    """(T + 1, B, N) seats that share a cell, first state and last included; all False in worlds without collisions."""
+    """(T + 1, B, N) seats that share a cell, first state and last included; all False in worlds without
+    collisions.
+    """
     completed: Bools
     """(T + 1, B, N) seats whose car left by the end of its route in the step that led here."""
     success: Bools
@@ -99,7 +101,7 @@ def episodes(
     state, memory = begin(env, players, seeds, start, arrival)
     record = _Record(env)
     for _ in range(env.steps_max):
-        talk, memory = _talk(env, players, state, memory)
+        talk, memory = _talk(players, state, memory)
         if masked and talk is not None:
             talk = talk._replace(gates=np.zeros_like(talk.gates))
         actions, memory = _decide(env, players, state, memory, talk)
@@ -157,9 +159,7 @@ def _traffic(env: Environment[Any]) -> TrafficJunction:
     return env
 
 
-def _talk(
-    env: Environment[Any], players: Team | Scripted, state: Any, memory: Memory | None
-) -> tuple[Talk | None, Memory | None]:
+def _talk(players: Team | Scripted, state: Any, memory: Memory | None) -> tuple[Talk | None, Memory | None]:
     if not isinstance(players, Team):
         return None, None
     assert memory is not None

@@ -1,7 +1,8 @@
 """What a policy is to the rest of the house: numpy in, numpy out, nothing about torch.
 
-Shapes by legend: R rows (the living agents of a batch, flattened), O observation, H memory, D message, A actions.
-A step is two calls, because what is heard lies between them: ``speak`` before the messages travel, ``act`` after.
+Shapes by legend: R rows (the living agents of a batch, flattened), O observation, H memory, D message, A
+actions. A step is two calls, because what is heard lies between them: ``speak`` before the messages travel,
+``act`` after.
 """
 
 from typing import NamedTuple, Protocol
@@ -76,7 +77,7 @@ class Policy(Protocol):
     def act(
         self, hidden: NDArray[np.float32], inbox: NDArray[np.float32], sampled: RandomDraws | None = None
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
-        """From the memory that ``speak`` returned and the inbox (R, D) to actions (R,) and new memory (R, H)."""
+        """From the memory that ``speak`` returned and the inbox (R, D) to actions (R,) and memory (R, H)."""
         ...
 
     def vector(self, tokens: NDArray[np.int32]) -> NDArray[np.float32]:

@@ -1,7 +1,7 @@
 """What a message may be, and whether it is sent: the channels and the gate, as torch modules.
 
-A channel turns the speaker's raw vector into the message that listeners receive. Discrete channels pass the gradient
-straight through: the value is the codebook's, the slope is the raw vector's.
+A channel turns the speaker's raw vector into the message that listeners receive. Discrete channels pass the
+gradient straight through: the value is the codebook's, the slope is the raw vector's.
 
 Source: the paper, section 3 (prototypes); van den Oord et al. 2017, "Neural Discrete Representation Learning"
 (nearest neighbour, commitment); Bengio et al. 2013 (straight-through).
@@ -19,7 +19,7 @@ CHANNELS = ("none", "continuous", "prototype", "one-hot")
 
 
 class Utterance(NamedTuple):
-    """R raw vectors after the channel: token (R,) int64 (-1: none), message (R, D), loss (R,) (codebook upkeep)."""
+    """R raw vectors after the channel: token (R,) int64 (-1: none), message (R, D), upkeep loss (R,)."""
 
     token: Tensor
     message: Tensor
@@ -113,7 +113,8 @@ def pick(probability: Tensor, draws: Tensor) -> Tensor:
 def gate_of(logit: Tensor, draws: Tensor | None) -> Tensor:
     """Gate (R,) as 0.0 or 1.0: open where the logit is not negative, or sampled where draws are given.
 
-    The gradient is that of the probability (straight-through), so that listeners teach speakers when to speak.
+    The gradient is that of the probability (straight-through), so that listeners teach speakers when to
+    speak.
     """
     probability = torch.sigmoid(logit)
     hard = (logit >= 0) if draws is None else (draws < probability)

@@ -3,9 +3,10 @@
     observation -> encoder -> LSTM 1 -> message, gate          (``speak``)
     inbox, LSTM 1 -> LSTM 2 -> action, value                   (``act``)
 
-Message and gate are made from [hidden 1, encoded observation], the heads read [hidden 2, inbox, encoded observation]
-and the product of two linear maps of inbox and encoded observation: "is my next cell among theirs" is a match, which no
-linear head can see. Shapes: R rows (living agents), O observation, H hidden, D message, K tokens, A actions.
+Message and gate are made from [hidden 1, encoded observation], the heads read [hidden 2, inbox, encoded
+observation] and the product of two linear maps of inbox and encoded observation: "is my next cell among
+theirs" is a match, which no linear head can see. Shapes: R rows (living agents), O observation, H hidden, D
+message, K tokens, A actions.
 """
 
 from collections.abc import Mapping
@@ -21,7 +22,6 @@ from models.policies.api import RandomDraws, Speech
 from models.policies.channels import OneHotChannel, PrototypeChannel, gate_of, make_channel, pick
 
 MEMORY_PARTS = 5  # hidden 1, cell 1, hidden 2, cell 2, and the encoded observation kept between speak and act
-TRAINING_ONLY = ("decoder.", "critic.")  # weights that no one needs in order to play
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +83,13 @@ class Done(NamedTuple):
 class Encoder(nn.Module):
     """Observation (R, O) to (R, H): rectified and periodic features, then one layer.
 
-    Observations mix one-hot places with fine scales (route 3 of 12 is 0.27): the periodic features begin with large
-    weights, so that neighbouring values of a scale lie far apart from the first update on.
+    Observations mix one-hot places with fine scales (route 3 of 12 is 0.27): the periodic features begin with
+    large weights, so that neighbouring values of a scale lie far apart from the first update on.
     """
 
-    FREQUENCY = 6.0  # standard deviation of the first weights: a twelfth of a scale turns the phase by half a radian
+    FREQUENCY = (
+        6.0  # standard deviation of the first weights: a twelfth of a scale turns the phase by half a radian
+    )
 
     def __init__(self, observation: int, hidden: int) -> None:
         super().__init__()
@@ -117,8 +119,9 @@ class RecurrentNet(nn.Module):
         self.match_inbox = nn.Linear(a.message, hidden)
         self.match_own = nn.Linear(hidden, hidden)
         self.head = nn.Sequential(nn.Linear(self.features, hidden), nn.ReLU(), nn.Linear(hidden, a.actions))
-        for layer in (self.encoder.plain, self.encoder.join, self.speech[0], self.speech[2]):
-            nn.init.orthogonal_(layer.weight, gain=2.0**0.5)  # the default lets messages start near zero
+        for layer in (self.encoder.plain, self.encoder.join, *self.speech):
+            if isinstance(layer, nn.Linear):  # the default lets messages start near zero
+                nn.init.orthogonal_(layer.weight, gain=2.0**0.5)
 
     @property
     def features(self) -> int:
@@ -140,7 +143,7 @@ class RecurrentNet(nn.Module):
             draws: uniform numbers (R, 2), first for the token, second for the gate; greedy without.
             discrete: False sends the raw vector instead of its prototype (training before quantisation).
         """
-        hidden1, cell1, hidden2, cell2, _ = memory.split(self.architecture.hidden, dim=1)
+        hidden1, cell1, hidden2, cell2, _ = torch.split(memory, self.architecture.hidden, dim=1)
         encoded = self.encoder(observation)
         hidden1, cell1 = self.first(encoded, (hidden1, cell1))
         source = torch.cat((hidden1, encoded), 1)
@@ -172,7 +175,7 @@ class RecurrentNet(nn.Module):
 
     def act(self, memory: Tensor, inbox: Tensor) -> Done:
         """From the memory (R, 5H) that ``speak`` returned and the inbox (R, D) to action logits."""
-        hidden1, cell1, hidden2, cell2, encoded = memory.split(self.architecture.hidden, dim=1)
+        hidden1, cell1, hidden2, cell2, encoded = torch.split(memory, self.architecture.hidden, dim=1)
         hidden2, cell2 = self.second(torch.cat((hidden1, inbox), 1), (hidden2, cell2))
         match = self.match_inbox(inbox) * self.match_own(encoded)
         features = torch.cat((hidden2, inbox, encoded, match), 1)
@@ -183,8 +186,17 @@ class RecurrentNet(nn.Module):
 class RecurrentPolicy:
     """The weights as a ``Policy``: numpy in, numpy out, no gradients."""
 
-    def __init__(self, net: RecurrentNet) -> None:
+    def __init__(self, net: RecurrentNet, discrete: bool = True, open_gate: bool = False) -> None:
+        """Wrap the weights.
+
+        Args:
+            net: the weights, used as they are now and whenever they change.
+            discrete: False sends raw vectors, as training does before quantisation.
+            open_gate: every message is sent, as training does before the gate is taught.
+        """
         self.net = net.eval()
+        self._discrete = discrete or net.architecture.channel != "prototype"
+        self._open_gate = open_gate and net.architecture.channel != "none"
         self.architecture = net.architecture
         self.channel = net.architecture.channel
         self.tokens = net.architecture.tokens
@@ -223,13 +235,14 @@ class RecurrentPolicy:
         if sampled is not None:
             draws = torch.from_numpy(np.stack([sampled.uniform(len(hidden)) for _ in range(2)], 1))
         with torch.inference_mode():
-            said = self.net.speak(torch.from_numpy(hidden), torch.from_numpy(observation), draws)
-        return Speech(
-            said.token.numpy().astype(np.int32),
-            said.gate.numpy() >= 0.5,
-            said.message.numpy(),
-            said.memory.numpy(),
-        )
+            said = self.net.speak(
+                torch.from_numpy(hidden), torch.from_numpy(observation), draws, discrete=self._discrete
+            )
+        token = said.token.numpy().astype(np.int32)
+        gate = (said.gate.numpy() >= 0.5) | self._open_gate
+        exact = self._discrete and self.tokens > 0  # a straight-through sum is off by a rounding error
+        message = self.vector(token) if exact else said.message.numpy()
+        return Speech(token, gate, message, said.memory.numpy())
 
     def act(
         self, hidden: NDArray[np.float32], inbox: NDArray[np.float32], sampled: RandomDraws | None = None

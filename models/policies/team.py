@@ -20,7 +20,9 @@ class Talk(NamedTuple):
     """Everything said at one step."""
 
     tokens: NDArray[np.int32]
-    """(B, N), SILENT where nobody sits, where the seat does not speak, or where the channel has no codebook."""
+    """(B, N), SILENT where nobody sits, where the seat does not speak, or where the channel has no
+    codebook.
+    """
     gates: NDArray[np.bool_]
     """(B, N), False wherever nothing is sent."""
     messages: NDArray[np.float32]
@@ -61,7 +63,7 @@ class Team:
         return memory.held or self._only_speakers(talk), Memory(hidden, memory.held)
 
     def inbox(self, talk: Talk) -> NDArray[np.float32]:
-        """(B, N, D): mean over the messages received by each seat (gate open, own excluded); zeros if none."""
+        """(B, N, D): mean of what each seat receives (gate open, own excluded); zeros if nothing."""
         sent = talk.messages * talk.gates[:, :, None]
         others = sent.sum(1, keepdims=True) - sent
         count = talk.gates.sum(1, keepdims=True) - talk.gates  # (B, N)

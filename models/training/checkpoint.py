@@ -30,7 +30,11 @@ class Checkpoint(NamedTuple):
 def write(folder: Path, tensors: dict[str, Tensor], facts: dict[str, Any]) -> Path:
     """Write, force to disk, then take the old one's place: a kill at any moment leaves a whole file."""
     path, new = folder / FILE, folder / (FILE + ".new")
-    save_file({name: tensor.contiguous().clone() for name, tensor in tensors.items()}, new, {"facts": json.dumps(facts)})
+    save_file(
+        {name: tensor.contiguous().clone() for name, tensor in tensors.items()},
+        new,
+        {"facts": json.dumps(facts)},
+    )
     with new.open("rb") as file:
         os.fsync(file.fileno())
     new.replace(path)

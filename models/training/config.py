@@ -3,7 +3,7 @@
     name = "traffic_junction/budget-050"        the bundle it makes
     task = "traffic_junction/medium"
     seed = 1
-    [model] [start] [decoder] [check]           sizes, situations, information similarity, evaluation on the way
+    [model] [start] [decoder] [check]           sizes, situations, information similarity, held-out checks
     [[phase]] ...                               what is done, in order
 
 Unknown keys, missing keys and values out of range are refused with the name of the field.
@@ -51,7 +51,9 @@ class Start(_Strict):
     human: Share = 0.0
     """Share of episodes that begin as a human trial does (Traffic Junction only)."""
     arrival: tuple[Share, Share] | None = None
-    """Range of the arrival probability, drawn per episode evenly in its logarithm; the world's own if absent."""
+    """Range of the arrival probability, drawn per episode evenly in its logarithm; the world's own if
+    absent.
+    """
     wobble: Share = 0.0
     """Probability per step that the participant's car brakes against the policy's will, as people do."""
 
@@ -60,7 +62,9 @@ class Decoder(_Strict):
     """Information similarity: an auxiliary reader of what an agent heard, in training only."""
 
     target: Literal["none", "occupancy", "location", "coordinates"] = "none"
-    """occupancy: cells of the other cars now and after gas; location: cell of the speaker; coordinates: its row and column."""
+    """occupancy: cells of the other cars now and after gas; location: cell of the speaker; coordinates: its
+    row and column.
+    """
     reads: Literal["inbox", "heard"] = "heard"
     """inbox: linear in the mean message; heard: a small network on [second hidden, inbox]."""
 
@@ -77,7 +81,9 @@ class Check(_Strict):
     human_weight: Share = 0.5
     """Weight of the human trials in the score; the rest is the success from ``init``."""
     steps_weight: Weight = 0.0
-    """The score loses this much for a mean episode length of ``steps_max`` (Parent & Lost Child: find fast)."""
+    """The score loses this much for a mean episode length of ``steps_max`` (Parent & Lost Child: find
+    fast).
+    """
 
 
 class Leave(_Strict):
@@ -101,7 +107,9 @@ class Phase(_Strict):
     episodes: Count = 64
     """Episodes per update."""
     window: Annotated[int, Field(ge=0)] = 0
-    """Imitation: steps of the world between gradient steps, the memory carried over; 0 is the whole episode."""
+    """Imitation: steps of the world between gradient steps, the memory carried over; 0 is the whole
+    episode.
+    """
     lr: Annotated[float, Field(gt=0)] = 1e-3
     """Learning rate of Adam at the start."""
     lr_end: Annotated[float, Field(gt=0)] | None = None
@@ -109,12 +117,14 @@ class Phase(_Strict):
     clip: Annotated[float, Field(gt=0)] = 1.0
     """Largest gradient norm."""
     discrete: bool = True
-    """False: raw vectors are sent in place of prototypes. The first discrete phase builds the codebook by k-means."""
+    """False: raw vectors are sent in place of prototypes. The first discrete phase builds the codebook by
+    k-means.
+    """
     revive_every: Annotated[int, Field(ge=0)] = 25
     """Updates between revivals of unused prototypes; 0 for never."""
     gate: Literal["open", "learned", "rewarded", "enforced", "budget"] = "open"
-    """open: always sent; learned: unconstrained; rewarded: penalty on silence; enforced: the Enforcer's penalty on the
-    reward; budget: differentiable loss on each agent's mean gate."""
+    """open: always sent; learned: unconstrained; rewarded: penalty on silence; enforced: the Enforcer's
+    penalty on the reward; budget: differentiable loss on each agent's mean gate."""
     budget: Annotated[float, Field(gt=0, le=1)] | None = None
     """Share of messages to be sent (enforced and budget)."""
     gate_weight: Weight = 1.0
@@ -138,7 +148,9 @@ class Phase(_Strict):
     brake_weight: Annotated[float, Field(gt=0)] = 1.0
     """Imitation: weight of steps at which the rule brakes."""
     rule_share: Share = 0.0
-    """Imitation: share of episodes driven by the rule at the start of the phase, falling to none at its middle."""
+    """Imitation: share of episodes driven by the rule at the start of the phase, falling to none at its
+    middle.
+    """
     explore: Share = 0.0
     """Probability that an action is drawn uniformly instead of from the policy."""
     sampled: bool = True
@@ -155,7 +167,9 @@ class Phase(_Strict):
         if self.gate in ("enforced", "budget") and self.budget is None:
             raise ValueError(f"gate {self.gate!r} needs a budget")
         if self.kind == "imitate" and self.gate in ("rewarded", "enforced"):
-            raise ValueError(f"gate {self.gate!r} changes the reward, which imitation has none of; use budget")
+            raise ValueError(
+                f"gate {self.gate!r} changes the reward, which imitation has none of; use budget"
+            )
         if self.kind == "reinforce" and self.window:
             raise ValueError("window is for imitation; the policy gradient needs whole episodes")
         if self.kind == "reinforce" and not self.sampled:
@@ -191,7 +205,9 @@ class Recipe(_Strict):
             raise ValueError(f"unknown task {self.task!r}; choose one of {', '.join(registry.NAMES)}")
         traffic = self.task.startswith("traffic_junction")
         if not traffic and (self.start != Start() or self.check.human or self._uses_traffic()):
-            raise ValueError(f"{self.task} has no traffic: no start, human trials, imitation or first_collision_only")
+            raise ValueError(
+                f"{self.task} has no traffic: no start, human trials, imitation or first_collision_only"
+            )
         if (self.decoder.target == "occupancy") != traffic and self.decoder.target != "none":
             raise ValueError(f"decoder.target {self.decoder.target!r} does not fit {self.task}")
         if self.model.channel == "one-hot" and self.model.tokens != self.model.message:
@@ -217,7 +233,11 @@ def parse(raw: dict[str, Any], source: str = "recipe") -> Recipe:
     except ValidationError as error:
         first = error.errors()[0]
         field = ".".join(str(part) for part in first["loc"]) or "recipe"
-        reason = "unknown key" if first["type"] == "extra_forbidden" else first["msg"].removeprefix("Value error, ")
+        reason = (
+            "unknown key"
+            if first["type"] == "extra_forbidden"
+            else first["msg"].removeprefix("Value error, ")
+        )
         raise RecipeError(f"{source}: {field}: {reason}") from None
 
 

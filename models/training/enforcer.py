@@ -2,11 +2,12 @@
 
 With c the observed share of messages and b the budget,
 
-    R_P = (b - c) / b if c <= b else (b - c) / (1 - b),    R_D = change of R_P,    R_I = sum of R_P, |R_I| < K,
-    penalty = scale * |P R_P + D R_D + I R_I|.
+    R_P = (b - c) / b if c <= b else (b - c) / (1 - b),    R_D = change of R_P,    R_I = sum of R_P, |R_I| <
+    K, penalty = scale * |P R_P + D R_D + I R_I|.
 
-The magnitude is taken: read as a signed sum, the formula would pay for talking too much. A budget of 1 is the open gate
-and has no penalty above it. History (the previous and the summed R_P) runs over updates, on the mean over episodes.
+The magnitude is taken: read as a signed sum, the formula would pay for talking too much. A budget of 1 is the
+open gate and has no penalty above it. History (the previous and the summed R_P) runs over updates, on the
+mean over episodes.
 
 Source: Karten et al. 2023, Enforcers; constants from there, scale from the authors' code.
 """
@@ -16,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-P, D, I = 1.0, 1.6, 0.026
+PROPORTION, CHANGE, SUM = 1.0, 1.6, 0.026
 K = 50.0
 SCALE = 0.1
 
@@ -36,7 +37,7 @@ class Enforcer:
     def penalty(self, share: Floats) -> Floats:
         """Penalty (B,) of episodes with these shares of communication (B,)."""
         now = proportional(share, self.budget)
-        return SCALE * np.abs(P * now + D * (now - self.previous) + I * self.total)
+        return SCALE * np.abs(PROPORTION * now + CHANGE * (now - self.previous) + SUM * self.total)
 
     def after(self, share: Floats) -> "Enforcer":
         """The controller once these shares (B,) have been seen."""

@@ -1,12 +1,14 @@
 """Labels for the warm start in Traffic Junction: front car first, with caution.
 
-The rule sees every car; the learner sees only itself and hears the others, visits its own states and is told there what
-the rule would do. Messages are learned through the listeners' gradient. Nobody is ever served the rule.
+The rule sees every car; the learner sees only itself and hears the others, visits its own states and is told
+there what the rule would do. Messages are learned through the listeners' gradient. Nobody is ever served the
+rule.
 
-A car on its way to a junction brakes if its next cell is taken now, unless it stands on its entry cell, where another
-car may appear on it; it brakes if a car of higher rank enters the same cell, or if its next cell is held by a car that
-brakes. Rank: inside a junction first, then further along the route, then the lower route. Whoever is inside a junction
-or past the last one follows only the last two rules and therefore never has to wait for long.
+A car on its way to a junction brakes if its next cell is taken now, unless it stands on its entry cell, where
+another car may appear on it; it brakes if a car of higher rank enters the same cell, or if its next cell is
+held by a car that brakes. Rank: inside a junction first, then further along the route, then the lower route.
+Whoever is inside a junction or past the last one follows only the last two rules and therefore never has to
+wait for long.
 """
 
 from dataclasses import dataclass
@@ -42,7 +44,7 @@ def labels(env: TrafficJunction, state: TrafficState) -> Ints:
 
 
 def intent(env: TrafficJunction, state: TrafficState) -> Ints:
-    """Return the cell that each car would enter if it gassed (B, N); -1 out of the grid or for empty slots."""
+    """Return the cell that each car would enter with gas (B, N); -1 out of the grid or for empty slots."""
     ahead = state.position + 1
     leads_on = state.alive & (ahead < env.route_length[state.route])
     last = env.route_cells.shape[1] - 1

@@ -1,4 +1,4 @@
-"""From continuous messages to a codebook: k-means of learned vectors, and new life for prototypes nobody uses."""
+"""From continuous messages to a codebook: k-means, and new life for prototypes that nobody uses."""
 
 import torch
 from torch import Tensor
@@ -34,11 +34,13 @@ def _spread(vectors: Tensor, count: int, generator: torch.Generator) -> Tensor:
 
 
 def revived(codebook: Tensor, uses: Tensor, vectors: Tensor, generator: torch.Generator) -> Tensor:
-    """The codebook (K, D) with every prototype of no use (uses (K,)) moved to a vector (M, D) far from its prototype."""
+    """The codebook (K, D) with unused prototypes (uses (K,)) moved to vectors (M, D) far from theirs."""
     dead = torch.nonzero(uses == 0).squeeze(1)
     if not len(dead) or not len(vectors):
         return codebook
-    distance = torch.cdist(vectors, codebook[uses > 0] if len(dead) < len(codebook) else codebook).min(1).values
+    distance = (
+        torch.cdist(vectors, codebook[uses > 0] if len(dead) < len(codebook) else codebook).min(1).values
+    )
     chosen = torch.multinomial(distance.square() + 1e-12, len(dead), replacement=True, generator=generator)
     fresh = codebook.clone()
     fresh[dead] = vectors[chosen]

@@ -4,8 +4,8 @@
            + d information similarity + g budget loss
     A: generalised advantage of each agent while it lives, normalised over the batch; R = A + V.
 
-A learned gate is an action too: log pi(gate) A is added where gates were drawn. Shapes: T steps, B episodes, N seats, M
-rows, A actions.
+A learned gate is an action too: log pi(gate) A is added where gates were drawn. Shapes: T steps, B episodes,
+N seats, M rows, A actions.
 
 Source: Williams 1992; Schulman et al. 2016 (generalised advantage estimation); Karten et al. 2023.
 """
@@ -37,7 +37,9 @@ class Learner(nn.Module):
         super().__init__()
         size = net.architecture
         self.net = net
-        self.critic = nn.Sequential(nn.Linear(net.features, size.hidden), nn.ReLU(), nn.Linear(size.hidden, 1))
+        self.critic = nn.Sequential(
+            nn.Linear(net.features, size.hidden), nn.ReLU(), nn.Linear(size.hidden, 1)
+        )
         self.decoder = None if decoder.target == "none" else Reader(env, decoder, size.hidden, size.message)
 
 
@@ -75,7 +77,9 @@ def gradient_loss(
         parts["channel"] = seen.channel_loss
     if labels is not None:
         weight = phase.policy_weight if phase.kind == "imitate" else phase.imitation_weight
-        parts["imitation"] = weight * imitation_loss(seen.logits, torch.from_numpy(labels), phase.brake_weight)
+        parts["imitation"] = weight * imitation_loss(
+            seen.logits, torch.from_numpy(labels), phase.brake_weight
+        )
     if learner.decoder is not None and phase.decoder_weight:
         parts["decoder"] = phase.decoder_weight * similarity_loss(env, learner.decoder, seen)
     if phase.gate == "budget" and phase.budget is not None:
@@ -176,7 +180,9 @@ def grid(rows: Floats, seen: Unrolled) -> Floats:
     return spread.reshape(seen.living.shape)
 
 
-def advantages(rewards: Floats, values: Floats, continues: NDArray[np.bool_], gamma: float, lam: float) -> Floats:
+def advantages(
+    rewards: Floats, values: Floats, continues: NDArray[np.bool_], gamma: float, lam: float
+) -> Floats:
     """Generalised advantages (T, B, N): each agent's, until it leaves, is replaced or the episode ends."""
     result = np.zeros_like(rewards)
     running = np.zeros_like(rewards[0])

@@ -1,54 +1,19 @@
-"""Follow a recipe: phase by phase, update by update, keeping the best policy by held-out checks.
+"""Follow a recipe from the first update to the best policy."""
 
-A run lives in one folder: ``checkpoint.safetensors`` (everything, replaced at each check) and ``log.csv`` (one line per
-check). Killed at any moment, it goes on from its last check and ends with the same weights, on the same machine.
-"""
-
-import csv
-import hashlib
-import json
-import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress as Bar, TextColumn, TimeRemainingColumn
-from torch import Tensor
+from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+from rich.progress import Progress as Bar
 
-from models import rollout
-from models.envs import registry
-from models.envs.traffic_junction import BRAKE, TrafficJunction
-from models.policies import bundle
-from models.policies.channels import PrototypeChannel
-from models.policies.recurrent import Architecture, RecurrentNet, RecurrentPolicy
-from models.policies.team import Team
-from models.training import checkpoint, config
-from models.training.config import Phase, Recipe
-from models.training.curriculum import Progress, between, rule_share, same_regime
-from models.training.enforcer import Enforcer
-from models.training.imitation import labels
-from models.training.quantise import kmeans, revived
-from models.training.reinforce import Learner, gradient_loss, shares
-from models.training.situations import OVERRIDES, beginning, check_seeds, generator, uniforms
-from models.training.unroll import Beginning, Manner, Unrolled, unroll
+from models.policies.recurrent import RecurrentPolicy
+from models.training import config
+from models.training.config import Recipe
+from models.training.trainer import Trainer
 
-LOG = "log.csv"
-COLUMNS = (
-    "phase", "update", "total", "env_steps", "seconds", "lr", "loss", "parts",
-    "success", "human", "arrived", "steps", "message_rate", "human_rate", "tokens_used", "score", "best",
-)  # fmt: skip
-CODEBOOK_BATCHES = 4  # unrolls from which the codebook is built: some 10,000 messages
-OVER_BUDGET = 2.0  # score lost per message rate above budget + tolerance
-TOLERANCE = 0.01
-
-
-class TrainingError(Exception):
-    """A run cannot go on. One line: what happened, and where the last good weights are."""
+PACKAGED = Path(__file__).parent.parent / "bundles"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,19 +28,6 @@ class TrainingResult:
     steps: int
     """Environment steps trained on."""
     folder: Path
-
-
-class Checked(NamedTuple):
-    """One evaluation on held-out situations, greedy."""
-
-    success: float
-    human: float
-    arrived: float
-    steps: float
-    message_rate: float
-    human_rate: float
-    tokens_used: int
-    score: float
 
 
 def run(
@@ -103,337 +55,18 @@ def run(
     torch.set_num_threads(1)
     trainer = Trainer(recipe, Path(out_dir), Path(bundles) if bundles else PACKAGED)
     trainer.open(resume)
-    with _bar(recipe, progress) as bar:
-        task = bar.add_task(recipe.name, total=sum(p.updates for p in recipe.phase), completed=trainer.at.total)
+    with _bar(progress) as bar:
+        task = bar.add_task(
+            recipe.name, total=sum(p.updates for p in recipe.phase), completed=trainer.at.total
+        )
         while not trainer.finished:
             trainer.advance()
             bar.update(task, completed=trainer.at.total, description=trainer.status)
-    return trainer.result()
+    return TrainingResult(
+        recipe, trainer.best_policy(), trainer.best_score, trainer.at.total, trainer.at.steps, trainer.folder
+    )
 
 
-PACKAGED = Path(__file__).parent.parent / "bundles"
-
-
-def _bar(recipe: Recipe, shown: bool) -> Bar:
+def _bar(shown: bool) -> Bar:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     return Bar(*columns, console=Console(stderr=True), disable=not shown)
-
-
-class Trainer:
-    """One run: weights, optimiser, place in the recipe, best so far."""
-
-    def __init__(self, recipe: Recipe, folder: Path, bundles: Path) -> None:
-        self.recipe, self.folder, self.bundles = recipe, folder, bundles
-        self.env = registry.make(recipe.task)
-        self.at = Progress()
-        self.finished = False
-        self.enforcer: Enforcer | None = None
-        self.best: dict[str, Tensor] = {}
-        self.best_score = float("-inf")
-        self.status = recipe.name
-        self._uses = torch.zeros(recipe.model.tokens, dtype=torch.int64)
-        self._seconds = 0.0
-        self._losses: dict[str, float] = {}
-
-    @property
-    def phase(self) -> Phase:
-        return self.recipe.phase[self.at.phase]
-
-    # -- beginning ---------------------------------------------------------------------------------------------------
-
-    def open(self, resume: bool) -> None:
-        """Start afresh, or from the folder's checkpoint."""
-        held = (self.folder / checkpoint.FILE).exists()
-        if held and not resume:
-            raise TrainingError(f"{self.folder}: holds a run already; resume it or choose another folder")
-        self.folder.mkdir(parents=True, exist_ok=True)
-        torch.manual_seed(self.recipe.seed)
-        sizes = self.recipe.model.model_dump()
-        net = RecurrentNet(
-            Architecture(observation_size=self.env.observation_size, actions=self.env.actions, **sizes)
-        )
-        self.learner = Learner(self.env, net, self.recipe.decoder)
-        if held:
-            self._restore()
-            return
-        if self.recipe.init_from is not None:
-            self._inherit(self.recipe.init_from)
-        self._enter()
-        with (self.folder / LOG).open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow(COLUMNS)
-
-    def _inherit(self, name: str) -> None:
-        """Take the weights of a released bundle; a gate that it lacks begins open."""
-        try:
-            source = bundle.load(self.bundles / name).policy
-        except bundle.BundleError as error:
-            raise TrainingError(f"init_from {name}: {error}; train that recipe first") from None
-        assert isinstance(source, RecurrentPolicy)
-        own = self.learner.net.state_dict()
-        weights = source.weights()
-        odd = [key for key, value in own.items() if key in weights and weights[key].shape != value.shape]
-        if odd or set(weights) - set(own):
-            raise TrainingError(f"init_from {name}: its sizes are not those of [model]")
-        self.learner.net.load_state_dict(own | weights)
-        if self.learner.net.gate is not None and "gate.bias" not in weights:
-            torch.nn.init.zeros_(self.learner.net.gate.weight)
-            torch.nn.init.constant_(self.learner.net.gate.bias, 1.0)
-
-    def _enter(self) -> None:
-        """Begin the phase at hand: codebook, optimiser, controller."""
-        phase = self.phase
-        before = self.recipe.phase[self.at.phase - 1] if self.at.phase else None
-        if before is not None and not same_regime(self.recipe, self.at.phase - 1, self.at.phase):
-            self.best, self.best_score = {}, float("-inf")
-        if before is not None and phase.discrete and not before.discrete:
-            self._build_codebook()
-        self.optimiser = torch.optim.Adam(self.learner.parameters(), lr=phase.lr)
-        budget = phase.budget if phase.gate == "enforced" else None
-        self.enforcer = None if budget is None else Enforcer(budget)
-        self._uses.zero_()
-
-    @torch.no_grad()
-    def _build_codebook(self) -> None:
-        channel = self.learner.net.channel
-        if not isinstance(channel, PrototypeChannel):
-            return
-        continuous = self.phase.model_copy(update={"discrete": False})
-        updates = range(self.at.total, self.at.total + CODEBOOK_BATCHES)
-        raw = [one.raw[_uttered(one)] for update in updates for one, _ in self._windows(continuous, update)]
-        draws = generator(self.recipe.seed, self.at.total)
-        channel.codebook.copy_(kmeans(torch.cat(raw), self.recipe.model.tokens, draws))
-
-    # -- one update --------------------------------------------------------------------------------------------------
-
-    def advance(self) -> None:
-        """One update, and whatever is due after it: check, revival, next phase, end."""
-        begun = time.perf_counter()
-        phase = self.phase
-        entropy = between(phase.entropy, phase.entropy_end, self.at, phase)
-        steps = 0
-        for seen, rule in self._windows(phase, self.at.total):
-            loss = gradient_loss(self.env, self.learner, seen, phase, entropy, self.enforcer, rule)
-            if not torch.isfinite(loss.total):
-                raise TrainingError(f"loss is {float(loss.total)} in phase {phase.name!r}; {self._last_good()}")
-            self._descend(loss.total)
-            self._losses = loss.parts
-            if self.enforcer is not None:
-                self.enforcer = self.enforcer.after(shares(seen))
-            self._count(seen)
-            steps += int((~np.stack([self.env.done(s) for s in seen.states[:-1]])).sum())
-        self._revive(seen)
-        self.at = self.at.updated(steps)
-        self._seconds += time.perf_counter() - begun
-        if self.at.update % self.recipe.check.every == 0 or self.at.ends(phase):
-            self._check()
-
-    def _last_good(self) -> str:
-        path = self.folder / checkpoint.FILE
-        return f"last good checkpoint: {path}" if path.exists() else "no checkpoint yet; lower the learning rate"
-
-    def _descend(self, loss: Tensor) -> None:
-        phase = self.phase
-        for group in self.optimiser.param_groups:
-            group["lr"] = between(phase.lr, phase.lr_end, self.at, phase)
-        self.optimiser.zero_grad(set_to_none=True)
-        loss.backward()  # type: ignore[no-untyped-call]
-        for part in self.learner.children():  # apart, so that large value errors do not shrink the policy's steps
-            torch.nn.utils.clip_grad_norm_(part.parameters(), phase.clip)
-        self.optimiser.step()
-
-    def _windows(self, phase: Phase, update: int) -> Iterator[tuple[Unrolled, NDArray[np.int64] | None]]:
-        """Play the episodes of one update, window by window, with the rule's actions (M,) where they are asked for."""
-        recipe, steps_max = self.recipe, self.env.steps_max
-        manner = Manner(phase.discrete, phase.sampled, phase.explore, phase.gate == "open")
-        draws = generator(recipe.seed, update)
-        begin = beginning(
-            self.env, self.learner.net, recipe.start, manner, phase.episodes, recipe.seed, update, draws
-        )
-        override = _Overrides(self.env, recipe, phase, self.at, update)
-        for first in range(0, steps_max, phase.window or steps_max):
-            steps = range(first, min(first + (phase.window or steps_max), steps_max))
-            seen = unroll(self.env, self.learner.net, begin, manner, draws, override.use, steps)
-            yield seen, override.rows(seen)
-            begin = Beginning(seen.states[-1], seen.memory)
-
-    def _count(self, seen: Unrolled) -> None:
-        """Count the prototypes in use."""
-        if isinstance(self.learner.net.channel, PrototypeChannel):
-            self._uses += torch.bincount(seen.token[_uttered(seen)], minlength=len(self._uses))
-
-    @torch.no_grad()
-    def _revive(self, seen: Unrolled) -> None:
-        channel, phase = self.learner.net.channel, self.phase
-        if not isinstance(channel, PrototypeChannel) or not phase.discrete or not phase.revive_every:
-            return
-        early = self.at.update < 0.8 * phase.updates  # what is revived must have time to find its meaning
-        if early and (self.at.update + 1) % phase.revive_every == 0:
-            draws = generator(self.recipe.seed + 1, self.at.total)
-            channel.codebook.copy_(revived(channel.codebook, self._uses, seen.raw[_uttered(seen)], draws))
-            self._uses.zero_()
-
-    # -- checks ------------------------------------------------------------------------------------------------------
-
-    def _check(self) -> None:
-        """Evaluate, keep the best, log, move on to the next phase if it is time, and write the checkpoint."""
-        phase = self.phase
-        checked = self.evaluate()
-        better = checked.score > self.best_score
-        if better:
-            self.best_score = checked.score
-            self.best = {name: value.clone() for name, value in self.learner.net.state_dict().items()}
-        self._log(checked, better)
-        self.status = f"{self.recipe.name} {phase.name}: success {checked.success:.3f}, score {checked.score:.3f}"
-        self.at = self.at.checked(phase, checked.success)
-        if self.at.ends(phase):
-            self.learner.net.load_state_dict(self.best)
-            if self.at.phase + 1 == len(self.recipe.phase):
-                self.finished = True
-            else:
-                self.at = self.at.next_phase()
-                self._enter()
-        self._save()
-
-    def evaluate(self) -> Checked:
-        """Greedy episodes on held-out situations, with the messages and the gate of this phase."""
-        check, phase = self.recipe.check, self.phase
-        team = Team(self.env, _PhasePolicy(self.learner.net, phase))
-        played = rollout.episodes(self.env, team, check_seeds(check.episodes))
-        success, steps = float(played.success.mean()), float(played.steps.mean())
-        human = arrived = human_rate = float("nan")
-        score = success - check.steps_weight * steps / self.env.steps_max
-        rates = [played.message_rate]
-        if check.human:
-            trial = rollout.episodes(self.env, team, check_seeds(check.human), "human")
-            human, human_rate = float(trial.success.mean()), trial.message_rate
-            arrived = float(rollout.trials(trial).arrived.mean())
-            score = (1 - check.human_weight) * score + check.human_weight * (human + arrived) / 2
-            rates.append(human_rate)
-        if phase.budget is not None:
-            score -= OVER_BUDGET * sum(max(0.0, rate - phase.budget - TOLERANCE) for rate in rates)
-        used = len(np.unique(played.tokens[played.gates]))
-        return Checked(success, human, arrived, steps, rates[0], human_rate, used, score)
-
-    def _log(self, checked: Checked, better: bool) -> None:
-        phase, at = self.phase, self.at
-        parts = " ".join(f"{name}={value:.4f}" for name, value in self._losses.items())
-        lr = between(phase.lr, phase.lr_end, at, phase)
-        numbers = [f"{value:.4f}" if isinstance(value, float) else value for value in checked]
-        row = [phase.name, at.update, at.total, at.steps, f"{self._seconds:.1f}", f"{lr:.2e}",
-               f"{sum(self._losses.values()):.4f}", parts, *numbers, int(better)]  # fmt: skip
-        with (self.folder / LOG).open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow(row)
-
-    # -- the run on disk ---------------------------------------------------------------------------------------------
-
-    def _save(self) -> None:
-        tensors = {f"learner.{name}": value for name, value in self.learner.state_dict().items()}
-        tensors |= {f"best.{name}": value for name, value in self.best.items()}
-        tensors |= checkpoint.optimiser_tensors(self.optimiser)
-        tensors["uses"] = self._uses
-        enforcer = None if self.enforcer is None else [self.enforcer.previous, self.enforcer.total]
-        facts = {
-            "recipe": fingerprint(self.recipe), "at": self.at.to_dict(), "finished": self.finished,
-            "best_score": self.best_score if self.best else None, "enforcer": enforcer, "seconds": self._seconds,
-            "log_bytes": (self.folder / LOG).stat().st_size,
-        }  # fmt: skip
-        checkpoint.write(self.folder, tensors, facts)
-
-    def _restore(self) -> None:
-        held = checkpoint.read(self.folder)
-        if held.facts["recipe"] != fingerprint(self.recipe):
-            raise TrainingError(f"{self.folder}: belongs to another recipe; choose another folder")
-        self.at = Progress.from_dict(held.facts["at"])
-        self._enter_again()
-        self.learner.load_state_dict(checkpoint.part_of(held.tensors, "learner."))
-        self.best = checkpoint.part_of(held.tensors, "best.")
-        score = held.facts["best_score"]
-        self.best_score = float("-inf") if score is None else score
-        checkpoint.restore_optimiser(self.optimiser, held.tensors)
-        self._uses = held.tensors["uses"]
-        if held.facts["enforcer"] is not None and self.enforcer is not None:
-            previous, total = held.facts["enforcer"]
-            self.enforcer = replace(self.enforcer, previous=previous, total=total)
-        self.finished, self._seconds = held.facts["finished"], held.facts["seconds"]
-        with (self.folder / LOG).open("r+b") as file:
-            file.truncate(held.facts["log_bytes"])
-
-    def _enter_again(self) -> None:
-        self.optimiser = torch.optim.Adam(self.learner.parameters(), lr=self.phase.lr)
-        budget = self.phase.budget if self.phase.gate == "enforced" else None
-        self.enforcer = None if budget is None else Enforcer(budget)
-
-    def result(self) -> TrainingResult:
-        """The best policy of the last regime."""
-        self.learner.net.load_state_dict(self.best)
-        policy = RecurrentPolicy(self.learner.net)
-        return TrainingResult(self.recipe, policy, self.best_score, self.at.total, self.at.steps, self.folder)
-
-
-class _PhasePolicy(RecurrentPolicy):
-    """The policy as the phase runs it: raw vectors before quantisation, gate open while it is not yet taught."""
-
-    def __init__(self, net: RecurrentNet, phase: Phase) -> None:
-        super().__init__(net)
-        self._phase = phase
-
-    def speak(self, hidden: Any, observation: Any, sampled: Any = None) -> Any:
-        with torch.inference_mode():
-            said = self.net.speak(
-                torch.from_numpy(hidden), torch.from_numpy(observation), discrete=self._phase.discrete
-            )
-        gate = said.gate.numpy() >= 0.5
-        if self._phase.gate == "open" and self.channel != "none":
-            gate = np.ones_like(gate)
-        return bundle_speech(said, gate)
-
-
-def bundle_speech(said: Any, gate: NDArray[np.bool_]) -> Any:
-    from models.policies.api import Speech
-
-    return Speech(said.token.numpy().astype(np.int32), gate, said.message.numpy(), said.memory.numpy())
-
-
-class _Overrides:
-    """What else moves the cars in training: the rule (for labels and for its share of episodes), a wobbling participant."""
-
-    def __init__(
-        self, env: Any, recipe: Recipe, phase: Phase, at: Progress, update: int
-    ) -> None:
-        self._env, self._recipe = env, recipe
-        self.labels: list[NDArray[np.int32]] = []
-        self._wants_labels = phase.kind == "imitate" or phase.imitation_weight > 0
-        steps, batch = env.steps_max, phase.episodes
-        draws = uniforms(recipe.seed, OVERRIDES, update, batch * (steps + 1)).reshape(steps + 1, batch)
-        self._ruled = draws[0] < rule_share(at, phase)  # (B,)
-        self._wobbles = draws[1:] < recipe.start.wobble  # (T, B)
-        self.use = self if self._wants_labels or recipe.start.wobble else None
-
-    def rows(self, seen: Unrolled) -> NDArray[np.int64] | None:
-        """The rule's actions (M,) in the window that was just played."""
-        if not self._wants_labels:
-            return None
-        rule = np.stack(self.labels[-len(seen.living) :])  # (T, B, N)
-        return rule.reshape(len(rule), -1)[seen.step, seen.place].astype(np.int64)
-
-    def __call__(self, step: int, state: Any, actions: NDArray[np.int32]) -> NDArray[np.int32]:
-        assert isinstance(self._env, TrafficJunction)
-        if self._wants_labels:
-            rule = labels(self._env, state)
-            self.labels.append(rule)
-            actions = np.where(self._ruled[:, None], rule, actions)
-        wobbling = self._wobbles[step] & (state.guest >= 0)
-        if wobbling.any():
-            actions = actions.copy()
-            actions[wobbling, state.guest[wobbling]] = BRAKE
-        return actions
-
-
-def _uttered(seen: Unrolled) -> Tensor:
-    """Rows whose message can be heard."""
-    return torch.from_numpy(np.flatnonzero(seen.uttered))
-
-
-def fingerprint(recipe: Recipe) -> str:
-    """sha256 of a recipe's content."""
-    return hashlib.sha256(json.dumps(recipe.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()

@@ -1,7 +1,8 @@
 """Information similarity: can the world be read off what was heard? An auxiliary loss, in training only.
 
-Traffic Junction: occupancy of every road cell by the other cars now, and the cells that they would enter with gas (their
-intent). Parent & Lost Child: the cell of the speaker, or its row and column. Shapes: M rows, C road cells, D message.
+Traffic Junction: occupancy of every road cell by the other cars now, and the cells that they would enter with
+gas (their intent). Parent & Lost Child: the cell of the speaker, or its row and column. Shapes: M rows, C
+road cells, D message.
 
 Source: Karten et al. 2023, information similarity; intent after the paper's section on Traffic Junction.
 """
@@ -34,7 +35,7 @@ class Reader(nn.Module):
             self.read = nn.Sequential(nn.Linear(hidden + message, hidden), nn.ReLU(), nn.Linear(hidden, size))
 
         if settings.target == "occupancy":
-            last = self.read if isinstance(self.read, nn.Linear) else self.read[-1]
+            last = [layer for layer in self.read.modules() if isinstance(layer, nn.Linear)][-1]
             nn.init.constant_(last.bias, RARE)
 
     def forward(self, hidden: Tensor, inbox: Tensor) -> Tensor:
@@ -65,7 +66,7 @@ def similarity_loss(env: Environment[Any], reader: Reader, seen: Unrolled) -> Te
         return nn.functional.cross_entropy(read, cell)
     height, width = env.shape
     place = torch.stack((cell // width / (height - 1), cell % width / (width - 1)), 1)
-    return (read - place).square().sum(1).mean()
+    return torch.mean((read - place).square().sum(1))
 
 
 def occupancy(env: TrafficJunction, seen: Unrolled) -> np.ndarray[Any, np.dtype[np.float32]]:
@@ -88,11 +89,11 @@ def _others(columns: Any, size: int, seen: Unrolled) -> np.ndarray[Any, np.dtype
     own = columns.reshape(len(columns), -1)[seen.step, seen.place]
     has = np.flatnonzero(own >= 0)
     rows[has, own[has]] -= 1
-    return (rows > 0).astype(np.float32)
+    return np.asarray(rows > 0, np.float32)
 
 
 def _speaker_cell(env: Environment[Any], seen: Unrolled) -> np.ndarray[Any, np.dtype[np.int64]]:
     """(M,) cell of the one seat that speaks, at each row's step and episode."""
     speaker = int(np.flatnonzero(env.speaks)[0])
     cells = np.stack([env.cell_of(state)[:, speaker] for state in seen.states[:-1]])  # (T, B)
-    return cells[seen.step, seen.place // env.agents].astype(np.int64)
+    return np.asarray(cells[seen.step, seen.place // env.agents], np.int64)

@@ -1,4 +1,4 @@
-"""Where training and checks begin: seeds that never meet, and the mixture of situations that a recipe asks for."""
+"""Where training and checks begin: seeds that never meet, and the mixture a recipe asks for."""
 
 from typing import Any
 
@@ -14,9 +14,10 @@ from models.policies.recurrent import RecurrentNet
 from models.training.config import Start
 from models.training.unroll import Beginning, Manner, warmed_up
 
-# Streams over (recipe's seed, update): worlds, arrival probabilities, overrides, torch. Checks have their own seeds.
+# Streams over (recipe's seed, update): worlds, arrival probabilities, overrides, torch.
 WORLDS, ARRIVALS, OVERRIDES, TORCH = 11, 12, 13, 14
-CHECK_SEED = 2**40  # held out: training seeds are 64-bit words, of which none of the 10**7 drawn meets 1,000 given ones
+CHECK_SEED = 2**40
+"""Checks are held out: the chance that a training seed, a 64-bit word, is one of theirs is below 1e-9."""
 
 
 def check_seeds(count: int) -> NDArray[np.uint64]:

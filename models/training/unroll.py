@@ -1,8 +1,8 @@
 """Episodes with gradients: the same order of a step as ``models.policies.team``, on torch tensors.
 
-Only living agents go through the network: at each step the living seats of all episodes are one block of rows, and the
-memory of the next block is gathered from the last one. Shapes: T steps, B episodes, N seats, M rows of all steps
-together, D message, A actions, F features.
+Only living agents go through the network: at each step the living seats of all episodes are one block of
+rows, and the memory of the next block is gathered from the last one. Shapes: T steps, B episodes, N seats, M
+rows of all steps together, D message, A actions, F features.
 """
 
 from collections.abc import Callable
@@ -37,7 +37,7 @@ class Manner:
 
 
 class Beginning(NamedTuple):
-    """Where episodes begin: the states and what everybody remembers there (B*N, memory), or None for nothing."""
+    """Where episodes begin: the states, and what everybody remembers (B*N, memory) or None for nothing."""
 
     state: Any
     memory: Tensor | None
@@ -71,7 +71,9 @@ class Unrolled(NamedTuple):
     channel_loss: Tensor
     """scalar: mean over the rows that were uttered"""
     uttered: Bools
-    """(M,) the message of this row can be heard: its seat speaks and, where messages are held, it is the first."""
+    """(M,) the message of this row can be heard: its seat speaks and, where messages are held, it is the
+    first.
+    """
     living: Bools
     """(T, B, N)"""
     continues: Bools
@@ -103,14 +105,19 @@ class Mind:
         """What every seat remembers, (B*N, memory)."""
         return self._rows[torch.from_numpy(self._row_of)]
 
-    def speak(self, state: Any, living: Bools, generator: torch.Generator | None) -> tuple[NDArray[np.int64], Said]:
+    def speak(
+        self, state: Any, living: Bools, generator: torch.Generator | None
+    ) -> tuple[NDArray[np.int64], Said]:
         """The living seats (B, N) speak; returns their places (R,) and what they said."""
         place = np.flatnonzero(living)
         row = np.where(self.env.fresh(state).reshape(-1)[place], len(self._rows) - 1, self._row_of[place])
         observation = self.env.observe(state).reshape(-1, self.env.observation_size)[place]
         draws = torch.rand(len(place), 2, generator=generator) if generator is not None else None
         said = self.net.speak(
-            self._rows[torch.from_numpy(row)], torch.from_numpy(observation), draws, discrete=self.manner.discrete
+            self._rows[torch.from_numpy(row)],
+            torch.from_numpy(observation),
+            draws,
+            discrete=self.manner.discrete,
         )
         gate = torch.ones_like(said.gate) if self.manner.open_gate else said.gate
         if self.net.architecture.channel == "none":
@@ -158,7 +165,7 @@ def unroll(
     override: Override | None = None,
     steps: range | None = None,
 ) -> Unrolled:
-    """Play B episodes, or a window of their steps; gradients flow from every row to every message before it."""
+    """Play B episodes, or a window of their steps, with gradients from every row to all messages before."""
     state = beginning.state
     batch = len(env.done(state))
     mind = Mind(env, net, batch, manner)
@@ -222,8 +229,13 @@ def _choose(logits: Tensor, manner: Manner, generator: torch.Generator) -> Tenso
 
 
 def _collect(
-    env: Environment[Any], rows: list[_Rows], living: list[Bools], rewards: list[NDArray[np.float32]], states: list[Any],
-    memory: Tensor, first: int,
+    env: Environment[Any],
+    rows: list[_Rows],
+    living: list[Bools],
+    rewards: list[NDArray[np.float32]],
+    states: list[Any],
+    memory: Tensor,
+    first: int,
 ) -> Unrolled:
     features = torch.cat([r.features for r in rows])
     hidden = rows[0].said.memory.shape[1] // 5

@@ -1,0 +1,56 @@
+"""How good is the policy now? Greedy episodes on held-out situations; their score decides what is kept."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from models import rollout
+from models.envs.api import Environment
+from models.policies.recurrent import RecurrentNet, RecurrentPolicy
+from models.policies.team import Team
+from models.training.config import Check, Phase
+from models.training.situations import check_seeds
+
+OVER_BUDGET = 2.0  # score lost per message rate above budget + tolerance
+TOLERANCE = 0.01
+
+
+class Checked(NamedTuple):
+    """One evaluation; human trials are nan where the recipe asks for none."""
+
+    success: float
+    """Share of episodes from ``init`` that went well."""
+    human: float
+    """Share of human trials in which no car met another, in all steps."""
+    arrived: float
+    """Share of human trials in which the participant's car arrived."""
+    steps: float
+    """Mean length of the episodes from ``init``."""
+    message_rate: float
+    """Messages per living agent and step, from ``init``."""
+    human_rate: float
+    """... in human trials."""
+    tokens_used: int
+    """Different tokens sent, from ``init``."""
+    score: float
+    """What is to be maximised."""
+
+
+def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Check) -> Checked:
+    """Evaluate with the messages and the gate of this phase."""
+    team = Team(env, RecurrentPolicy(net, phase.discrete, phase.gate == "open"))
+    played = rollout.episodes(env, team, check_seeds(settings.episodes))
+    success, steps = float(played.success.mean()), float(played.steps.mean())
+    human = arrived = human_rate = float("nan")
+    score = success - settings.steps_weight * steps / env.steps_max
+    rates = [played.message_rate]
+    if settings.human:
+        trial = rollout.episodes(env, team, check_seeds(settings.human), "human")
+        human, human_rate = float(trial.success.mean()), trial.message_rate
+        arrived = float(rollout.trials(trial).arrived.mean())
+        score = (1 - settings.human_weight) * score + settings.human_weight * (human + arrived) / 2
+        rates.append(human_rate)
+    if phase.budget is not None:
+        score -= OVER_BUDGET * sum(max(0.0, rate - phase.budget - TOLERANCE) for rate in rates)
+    used = len(np.unique(played.tokens[played.gates]))
+    return Checked(success, human, arrived, steps, rates[0], human_rate, used, score)
