@@ -18,10 +18,12 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args
 
+from pydantic_core import from_json  # reads the same values as json, in half the time
+
 from server.domain import canonical
 from server.domain.errors import BadInputError, NotFoundError
 from server.domain.participation import has_left
-from server.domain.study import from_json
+from server.domain.study import from_json as definition_of
 from server.services import codebook, tidy, tracks
 from server.services.lab import Lab
 from server.storage import exports
@@ -208,7 +210,7 @@ def _files(
     """Give every file as name and pieces; each must be used up before the next is asked for."""
     moment = lab.now()
     versions = exports.version_rows(db, choice.study_id)
-    leases = {row["number"]: from_json(row["definition"]).lease_min for row in versions}
+    leases = {row["number"]: definition_of(row["definition"]).lease_min for row in versions}
 
     def left(person: tidy.Row) -> bool:
         lease_began = canonical.minutes_before(moment, leases[person["study_version"]])
@@ -243,7 +245,7 @@ def _pages(
 def _stories(db: DbSession, people: Sequence[str], phases: Sequence[str]) -> Iterator[tidy.Story]:
     trials = {trial["id"]: trial for trial in exports.trial_rows(db, people, phases)}
     for trial_id, events in groupby(exports.event_rows(db, people, phases), itemgetter(0)):
-        read = [(seq, canonical.loads(body), stored_utc) for _, seq, body, stored_utc in events]
+        read = [(seq, from_json(body), stored_utc) for _, seq, body, stored_utc in events]
         yield tidy.story(trials[trial_id], read)
 
 

@@ -245,7 +245,10 @@ def test_a_folder_with_something_in_it_is_left_alone(lab: Lab, tmp_path: Path) -
     assert (tmp_path / "kept.txt").read_text() == "mine"
 
 
-def test_memory_does_not_grow_with_the_number_of_people(lab: Lab) -> None:
+def test_memory_does_not_grow_with_the_number_of_people(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("server.services.export.PEOPLE_A_PAGE", 2)
+    monkeypatch.setattr("server.services.export.ROWS_A_PIECE", 100)
+
     def peak_bytes() -> int:
         tracemalloc.start()
         for _ in stream_zip(lab, "signs", ()):
@@ -254,9 +257,9 @@ def test_memory_does_not_grow_with_the_number_of_people(lab: Lab) -> None:
         tracemalloc.stop()
         return peak
 
-    synthetic.fill(lab, "signs", 40)
+    synthetic.fill(lab, "signs", 6)
     for _ in stream_zip(lab, "signs", ()):  # fill the caches that are filled once
         pass
     few = peak_bytes()
-    synthetic.fill(lab, "signs", 120, first=40)
+    synthetic.fill(lab, "signs", 24, first=6)
     assert peak_bytes() < few * 1.25
