@@ -32,6 +32,12 @@ TICK_FIRST = "Please tick the box first: it says that you have read this page an
 Robot = Annotated[str | None, Header(alias="X-Hatlab-Robot", max_length=500)]
 
 
+@router.get("/")
+def front_door() -> Response:
+    """For whoever types the address of the server."""
+    return html(messages.front_door())
+
+
 @router.get("/s/{slug}")
 def entry_page(request: Request, lab: CurrentLab, slug: str, robot: Robot = None) -> Response:
     """Where this link leads: to consent, back into a session, or to a message."""

@@ -1,6 +1,7 @@
 """Errors as answers: a page for people, problem JSON (RFC 9457) for scripts, an incident number for bugs.
 
-The log never holds a path, a parameter or an error's message: session keys and marketplace ids stand in them.
+The log never holds a path, a parameter or a foreign error's message: session keys and marketplace ids stand
+in them. The details of our own errors name neither.
 """
 
 import json
@@ -35,6 +36,8 @@ ADVICE = {
     404: "Check the link, or open the one from your invitation again.",
     405: "Open the link from your invitation again; your progress is kept.",
     413: "Go back and send less.",
+    503: "Nothing was lost. Try again in a few minutes; if this happens again, write to the study's contact "
+    "and name the incident below.",
     500: "What you did so far is kept. Reload this page in a moment; if this happens again, write to the "
     "study's contact and name the incident below.",
 }
@@ -114,6 +117,7 @@ def incident(scope: Scope, error: BaseException, status: int = 500, title: str =
         method=scope["method"],
         route=getattr(scope.get("route"), "path", None),
         errors=[type(each).__name__ for each in chain(error)],
+        detail=error.detail if isinstance(error, HatlabError) else None,
         frames=frames(error),
     )
     return answer(scope, status, title, "", {"incident": number})
@@ -128,9 +132,14 @@ def chain(error: BaseException) -> list[BaseException]:
 
 
 def frames(error: BaseException) -> list[str]:
-    """Where it was raised, outermost first: file:line function."""
+    """Where it was raised, outermost first: our own files, and the very place."""
     stack = traceback.extract_tb(error.__traceback__)
-    return [f"{shown(frame.filename)}:{frame.lineno} {frame.name}" for frame in stack]
+    own = [frame for frame in stack if is_own(frame.filename)]
+    return [f"{shown(frame.filename)}:{frame.lineno} {frame.name}" for frame in (*own, *stack[-1:])]
+
+
+def is_own(filename: str) -> bool:
+    return Path(filename).is_relative_to(ROOT) and "site-packages" not in filename
 
 
 def shown(filename: str) -> str:

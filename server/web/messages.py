@@ -2,7 +2,7 @@
 
 from server.domain.study import StudyDefinition
 from server.services.enrol import EntryKind
-from server.web.pages import MessagePage
+from server.web.pages import Action, MessagePage
 
 CONTACT = "If you think that this is a mistake, write to {contact}."
 
@@ -13,6 +13,19 @@ def of_entry(kind: EntryKind, study: StudyDefinition) -> MessagePage:
         return preview(study.title)
     told = {"full": full, "paused": paused, "closed": closed}
     return told[kind](study.title, study.contact)
+
+
+def front_door() -> MessagePage:
+    return MessagePage(
+        "hatlab",
+        "This is a hatlab server",
+        (
+            "If you were invited to a study, open the link from your invitation.",
+            "If you run studies here, sign in.",
+        ),
+        "info",
+        Action("Sign in", "/admin"),
+    )
 
 
 def unknown_study() -> MessagePage:

@@ -29,7 +29,7 @@ class Timing(Body):
     is_trusted: bool
     hidden: bool
     resumed: bool
-    refresh_hz: Annotated[float, Field(gt=0, le=10_000, allow_inf_nan=False)] | None
+    refresh_hz: Annotated[float, Field(ge=1e-3, le=10_000, allow_inf_nan=False)] | None
     dropped_frames: Count
     board_px: Annotated[int, Field(ge=0, le=100_000)]
     early_keys: Count

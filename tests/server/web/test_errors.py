@@ -51,7 +51,7 @@ def client_of_a_failing_server() -> Client:
         try:
             int(key)
         except ValueError as cause:
-            raise CorruptError(f"about {key}") from cause
+            raise CorruptError("round 3 has no start") from cause
 
     @app.get("/crash/{key}")
     def crash(key: str) -> None:
@@ -115,10 +115,11 @@ def test_a_wrong_method_has_a_page_that_names_the_right_one(client: Client) -> N
 
 
 @pytest.mark.parametrize(
-    ("path", "named"), [("bug", ["CorruptError", "ValueError"]), ("crash", ["RuntimeError"])]
+    ("path", "named", "detail"),
+    [("bug", ["CorruptError", "ValueError"], "round 3 has no start"), ("crash", ["RuntimeError"], None)],
 )
 def test_a_bug_gets_a_number_and_the_log_no_key(
-    client: Client, log: LogCapture, path: str, named: list[str]
+    client: Client, log: LogCapture, path: str, named: list[str], detail: str | None
 ) -> None:
     response = client.get(f"/{path}/{KEY}")
     assert response.status_code == 500
@@ -127,6 +128,7 @@ def test_a_bug_gets_a_number_and_the_log_no_key(
     assert entry["incident"] in response.text
     assert entry["route"] == f"/{path}/{{key}}"
     assert entry["errors"] == named
-    assert any("test_errors.py" in frame for frame in entry["frames"])
+    assert entry["detail"] == detail
+    assert "test_errors.py" in entry["frames"][-1]
     assert KEY not in json.dumps(log.entries)
     assert KEY not in response.text

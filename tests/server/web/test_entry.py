@@ -1,0 +1,178 @@
+"""Every state in which somebody can open an entry link, and what consent leaves behind."""
+
+from typing import Any
+
+import pytest
+
+from server.services.lab import Lab
+from server.storage import participants, studies
+from server.storage.database import Database
+from tests.fakes import definition, fake_lab
+from tests.server.services.steps import launch
+from tests.server.web.client import Client
+from tests.server.web.walk import DEVICE, YES, client_of, come_in, hidden_fields, mturk, prolific
+
+SLUG = "traffic-junction"
+
+
+@pytest.fixture(name="lab")
+def quick_lab(sqlite_database: Database) -> Lab:
+    return fake_lab(sqlite_database)
+
+
+def open_study(lab: Lab, **changes: Any) -> Client:
+    status = changes.pop("status", "open")
+    launch(lab, definition(SLUG, **changes), status=status)
+    return client_of(lab)
+
+
+def people(lab: Lab) -> int:
+    with lab.database.reading() as db:
+        return len(list(participants.stream(db)))
+
+
+def test_the_consent_page_says_what_the_study_says_and_keeps_the_identifiers(lab: Lab) -> None:
+    page = open_study(lab).get(f"/s/{SLUG}", params=prolific())
+    assert page.status_code == 200
+    assert "about 15 minutes" in page.text
+    assert "Cross the junction" in page.text
+    assert hidden_fields(page.text).items() >= prolific().items()
+    assert people(lab) == 0
+
+
+@pytest.mark.parametrize("slug", ["nobody", "NOBODY", "a%00b", "%2e%2e", "x" * 500])
+def test_an_unknown_study_says_what_to_do(lab: Lab, slug: str) -> None:
+    client = client_of(lab)
+    for response in (client.get(f"/s/{slug}"), client.post(f"/s/{slug}/consent", data=YES)):
+        assert response.status_code == 404
+        assert "from your invitation" in response.text
+
+
+def test_a_draft_is_nobodys_business(lab: Lab) -> None:
+    with lab.database.writing() as db:
+        studies.add(db, SLUG, "t", "test", definition(SLUG).canonical, lab.now_utc())
+    assert client_of(lab).get(f"/s/{SLUG}").status_code == 404
+
+
+@pytest.mark.parametrize(("status", "said"), [("paused", "paused"), ("closed", "has ended")])
+def test_a_study_that_takes_nobody_says_so_and_stores_nothing(lab: Lab, status: str, said: str) -> None:
+    client = open_study(lab, status=status)
+    for response in (
+        client.get(f"/s/{SLUG}", params=prolific()),
+        client.post(f"/s/{SLUG}/consent", data={**prolific(), **YES}),
+    ):
+        assert said in response.text
+        assert response.status_code == 200
+    assert people(lab) == 0
+
+
+def test_a_full_study_says_so(lab: Lab) -> None:
+    arms = [{"name": "one", "bundle": "traffic_junction/budget-100", "places": 1}]
+    client = open_study(lab, arms=arms)
+    come_in(client, SLUG)
+    assert "All places are taken" in client.get(f"/s/{SLUG}", params=prolific("bob")).text
+    late = client.post(f"/s/{SLUG}/consent", data={**prolific("bob"), **YES})
+    assert "All places are taken" in late.text
+    assert people(lab) == 1
+
+
+def test_a_preview_shows_the_study_to_nobody_and_stores_nothing(lab: Lab) -> None:
+    client = open_study(lab)
+    hit = mturk(assignment="ASSIGNMENT_ID_NOT_AVAILABLE")
+    page = client.get(f"/s/{SLUG}", params=hit)
+    assert "This is a preview" in page.text
+    assert "frame-ancestors https://worker.mturk.com" in page.headers["content-security-policy"]
+    client.post(f"/s/{SLUG}/consent", data={**hit, **YES})
+    assert people(lab) == 0
+
+
+def test_declining_leaves_nothing(lab: Lab) -> None:
+    client = open_study(lab)
+    page = client.post(f"/s/{SLUG}/consent", data={**prolific(), **DEVICE, "agree": "no"})
+    assert "Nothing about you has been kept" in page.text
+    assert people(lab) == 0
+    assert not client.cookies
+
+
+@pytest.mark.parametrize("fields", [{"agree": "yes"}, {"read": "yes"}, {"agree": "maybe", "read": "yes"}, {}])
+def test_without_the_tick_the_page_comes_back_and_says_why(lab: Lab, fields: dict[str, str]) -> None:
+    client = open_study(lab)
+    page = client.post(f"/s/{SLUG}/consent", data={**prolific(), **fields})
+    assert page.status_code == 422
+    assert "tick the box" in page.text
+    assert hidden_fields(page.text).items() >= prolific().items()
+    assert people(lab) == 0
+
+
+def test_the_tick_that_was_missed_does_not_change_the_name_of_a_direct_visit(lab: Lab) -> None:
+    client = open_study(lab)
+    first = hidden_fields(client.get(f"/s/{SLUG}").text)
+    again = client.post(f"/s/{SLUG}/consent", data={**first, "agree": "yes"})
+    assert hidden_fields(again.text)["visit"] == first["visit"]
+
+
+def test_the_same_person_comes_back_to_the_same_session(lab: Lab) -> None:
+    client = open_study(lab)
+    address = come_in(client, SLUG)
+    again = client.get(f"/s/{SLUG}", params=prolific())
+    assert (again.status_code, again.headers["location"]) == (303, address)
+    twice = client.post(f"/s/{SLUG}/consent", data={**prolific(), **YES})
+    assert twice.headers["location"] == address
+    assert people(lab) == 1
+    assert not client.cookies
+
+
+def test_a_session_goes_on_after_the_study_was_closed(lab: Lab) -> None:
+    client = open_study(lab)
+    address = come_in(client, SLUG)
+    with lab.database.writing() as db:
+        study = studies.by_slug(db, SLUG)
+        assert study is not None
+        studies.set_status(db, study.id, "closed")
+    assert client.get(f"/s/{SLUG}", params=prolific()).headers["location"] == address
+    assert client.get(address).status_code == 200
+
+
+def test_a_cookie_brings_the_browser_of_a_direct_link_back(lab: Lab) -> None:
+    client = open_study(lab)
+    address = come_in(client, SLUG, {})
+    again = client.get(f"/s/{SLUG}")
+    assert (again.status_code, again.headers["location"]) == (303, address)
+    assert client_of(lab).get(f"/s/{SLUG}").status_code == 200
+    assert client.get(f"/s/{SLUG}", params=prolific()).status_code == 200
+
+
+def test_a_direct_form_sent_twice_is_one_person(lab: Lab) -> None:
+    client = open_study(lab)
+    fields = {**hidden_fields(client.get(f"/s/{SLUG}").text), **YES}
+    first, second = (client_of(lab).post(f"/s/{SLUG}/consent", data=fields) for _ in range(2))
+    assert first.headers["location"] == second.headers["location"]
+    assert people(lab) == 1
+
+
+@pytest.mark.parametrize(("url", "secure"), [("http://hatlab.test", False), ("https://hatlab.test", True)])
+def test_the_cookie_is_kept_from_scripts_and_other_sites(lab: Lab, url: str, secure: bool) -> None:
+    launch(lab, definition(SLUG))
+    client = client_of(lab, base_url=url)
+    fields = hidden_fields(client.get(f"/s/{SLUG}").text)
+    cookie = client.post(f"/s/{SLUG}/consent", data={**fields, **YES}).headers["set-cookie"]
+    assert cookie.startswith(f"hatlab-{SLUG}=")
+    parts = {part.strip().lower() for part in cookie.split(";")[1:]}
+    assert {"httponly", "samesite=lax", f"path=/s/{SLUG}"} <= parts
+    assert ("secure" in parts) == secure
+
+
+def test_a_cookie_that_names_nobody_is_ignored(lab: Lab) -> None:
+    client = open_study(lab)
+    client.cookies.set(f"hatlab-{SLUG}", "x" * 43)
+    assert "Before you start" in client.get(f"/s/{SLUG}").text
+
+
+def test_a_robot_needs_the_servers_signature(lab: Lab) -> None:
+    client = open_study(lab)
+    headers = {"X-Hatlab-Robot": "traffic-junction.forged.forged"}
+    refused = client.get(f"/s/{SLUG}", params=prolific(), headers=headers)
+    assert refused.status_code == 422
+    late = client.post(f"/s/{SLUG}/consent", data={**prolific(), **YES}, headers=headers)
+    assert late.status_code == 422
+    assert people(lab) == 0
