@@ -79,6 +79,14 @@ def take(state: S, rows: Any) -> S:
     return type(state)(**{f.name: getattr(state, f.name)[rows] for f in fields(state)})  # type: ignore[arg-type]
 
 
+def put(state: S, rows: Any, part: S) -> S:
+    """Return the batch with the episodes `rows` (an index array or mask) taken from `part`, in order."""
+    changed = {f.name: getattr(state, f.name).copy() for f in fields(state)}  # type: ignore[arg-type]
+    for name, array in changed.items():
+        array[rows] = getattr(part, name)
+    return type(state)(**changed)
+
+
 def where(chosen: Bools, state: S, otherwise: S) -> S:
     """Return a batch that takes each episode from `state` where chosen (B,), else from `otherwise`."""
     picked = {}

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from models import rng
-from models.envs.api import Bools, Ints, Seeds, where
+from models.envs.api import Bools, Ints, Seeds, put, take
 from models.envs.right_of_way import right_of_way
 from models.envs.traffic_junction import BRAKE, NEVER, TrafficJunction, TrafficState, with_arrival
 
@@ -69,34 +69,34 @@ def human_start(env: TrafficJunction, seeds: Seeds, arrival: float = ARRIVAL) ->
     if env.agents <= CARS[1]:
         raise ValueError(f"a human trial needs {CARS[1] + 1} slots, {env.name} has {env.agents}")
     seeds = np.asarray(seeds, np.uint64)
-    attempt, length = _search(env, seeds)
-    draw = _draw(env, seeds, attempt)
-    state = _begin(env, draw)
-    warmup = []
-    for step in range(int(length.max(initial=0))):
-        active = step < length
-        actions = np.where(active[:, None], right_of_way(env, state), np.int32(BRAKE))
-        warmup.append((_entered(env, state, draw, ~active, arrival), actions))
-        state = where(active, env.step(state, actions)[0], state)
-    everyone = np.ones(len(seeds), np.bool_)
-    return HumanStart(_entered(env, state, draw, everyone, arrival), tuple(warmup), length, draw.cars)
-
-
-def _search(env: TrafficJunction, seeds: Seeds) -> tuple[Ints, Ints]:
-    """Return the first attempt (B,) that lets the participant in, and after how many steps (B,)."""
     attempt = np.zeros(len(seeds), np.int32)
-    draw = _draw(env, seeds, attempt)
-    state = _begin(env, draw)
     while True:
-        ready = _ready(env, state, draw)
-        if ready.all():
-            return attempt, state.t
-        state = where(ready, state, env.step(state, right_of_way(env, state))[0])
-        again = ~ready & (state.t > WARMUP_MAX)
-        if again.any():
-            attempt = attempt + again.astype(np.int32)
-            draw = _draw(env, seeds, attempt)
-            state = where(again, _begin(env, draw), state)
+        begun, late = _warm_up(env, _draw(env, seeds, attempt), arrival)
+        if not late.any():
+            return begun
+        attempt += late
+
+
+def _warm_up(env: TrafficJunction, draw: _Draw, arrival: float) -> tuple[HumanStart, Bools]:
+    """Return the starts that these draws lead to, and which of them (B,) did not come about in time."""
+    state = _begin(env, draw)
+    length = np.zeros(len(draw.seed), np.int32)
+    waiting = np.arange(len(draw.seed))
+    warmup: list[tuple[TrafficState, Ints]] = []
+    while True:
+        if len(warmup) >= WARMUP_MIN:
+            ready = _ready(env, take(state, waiting), take(draw, waiting))
+            entering, waiting = waiting[ready], waiting[~ready]
+            length[entering] = len(warmup)
+            state = put(state, entering, _entered(env, take(state, entering), take(draw, entering), arrival))
+        if not waiting.size or len(warmup) == WARMUP_MAX:
+            late = np.isin(np.arange(len(length)), waiting)
+            return HumanStart(state, tuple(warmup), length, draw.cars), late
+        part = take(state, waiting)
+        actions = np.full(state.route.shape, BRAKE, np.int32)
+        actions[waiting] = right_of_way(env, part)
+        warmup.append((state, actions))
+        state = put(state, waiting, env.step(part, actions[waiting])[0])
 
 
 def _draw(env: TrafficJunction, seeds: Seeds, attempt: Ints) -> _Draw:
@@ -120,18 +120,16 @@ def _begin(env: TrafficJunction, draw: _Draw) -> TrafficState:
 
 
 def _ready(env: TrafficJunction, state: TrafficState, draw: _Draw) -> Bools:
-    """Return where the participant can appear (B,)."""
+    """Return where the participant can appear (B,), if the warm-up is long enough."""
     entry = env.route_cells[draw.route, 0]
     free = (env.cell_of(state) != entry[:, None]).all(1)
     apart = ~env.collided(state).any(1)
     full = state.alive.sum(1) == draw.cars
-    return np.asarray((state.t >= WARMUP_MIN) & full & apart & free)
+    return np.asarray(full & apart & free)
 
 
-def _entered(
-    env: TrafficJunction, state: TrafficState, draw: _Draw, chosen: Bools, arrival: float
-) -> TrafficState:
-    """Return the state with the participant in the last slot, in the chosen episodes (B,)."""
+def _entered(env: TrafficJunction, state: TrafficState, draw: _Draw, arrival: float) -> TrafficState:
+    """Return the states with the participant in the last slot."""
     last = np.zeros(env.agents, np.bool_)
     last[-1] = True
     joined = replace(
@@ -144,4 +142,4 @@ def _entered(
         crashed=np.zeros_like(state.crashed),
         cars_max=np.full_like(state.cars_max, env.agents),
     )
-    return where(chosen, with_arrival(joined, arrival), state)
+    return with_arrival(joined, arrival)

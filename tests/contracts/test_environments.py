@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from models.envs.api import join, take, where
+from models.envs.api import join, put, take, where
 from models.envs.registry import NAMES, UnknownTaskError, make
 
 B = 40
@@ -172,6 +172,11 @@ def test_batches_can_be_cut_chosen_and_joined(env: Any) -> None:
 
     assert _equal(take(mixed, chosen), take(late, chosen))
     assert _equal(take(mixed, ~chosen), take(early, ~chosen))
+    assert _equal(put(early, chosen, take(late, chosen)), mixed)
+    assert _equal(
+        put(early, np.array([3, 1]), take(late, np.array([3, 1]))),
+        where(np.isin(np.arange(B), [1, 3]), late, early),
+    )
     assert _equal(join([take(late, slice(0, 5)), take(late, slice(5, None))]), late)
 
 
