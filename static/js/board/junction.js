@@ -176,16 +176,22 @@ export function bands(lines) {
 }
 
 /**
- * Hairlines between the cells of a road.
+ * Hairlines between the cells of a road, none inside a crossing.
  * @param {number} size
  * @param {[number, number][]} rows
  * @param {[number, number][]} columns
  */
 function cellmarks(size, rows, columns) {
   const u = SIDE / size;
-  const inner = Array.from({ length: size - 1 }, (_, i) => num((i + 1) * u));
-  const across = rows.flatMap(([a, b]) => inner.map((x) => `M${x} ${num(a * u)}V${num(b * u)}`));
-  const down = columns.flatMap(([a, b]) => inner.map((y) => `M${num(a * u)} ${y}H${num(b * u)}`));
+  const edges = Array.from({ length: size - 1 }, (_, i) => i + 1);
+  const outside = (/** @type {[number, number][]} */ crossing) => (/** @type {number} */ edge) =>
+    crossing.every(([a, b]) => edge <= a || edge >= b);
+  const across = rows.flatMap(([a, b]) =>
+    edges.filter(outside(columns)).map((x) => `M${num(x * u)} ${num(a * u)}V${num(b * u)}`),
+  );
+  const down = columns.flatMap(([a, b]) =>
+    edges.filter(outside(rows)).map((y) => `M${num(a * u)} ${num(y * u)}H${num(b * u)}`),
+  );
   return [...across, ...down].join("");
 }
 

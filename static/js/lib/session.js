@@ -40,9 +40,8 @@ export class Session {
    * @returns {Promise<(RoundView & Brought) | null>} null: the page is being left
    */
   async open(after) {
-    const left = this.#flushed ? null : await this.#flush();
+    if (!this.#flushed) await this.#flush();
     this.#flushed = true;
-    if (left?.over) return this.#brought(left, true);
     const answer = await this.#post(this.seams.urls.round, { after });
     const view = this.#viewOf(answer);
     return view && this.#brought(view, after === null && this.#wasSeen(view));
@@ -88,13 +87,11 @@ export class Session {
     }
   }
 
-  /** @returns {Promise<RoundView | null>} the answer to the kept action, if there was one and it counted */
+  /** Sends the action that a reload left behind; whatever the answer, the server now knows more than we do. */
   async #flush() {
     const step = this.seams.outbox.get();
-    if (!step) return null;
-    const answer = await this.#post(this.seams.urls.step, step);
+    if (step) await this.#post(this.seams.urls.step, step);
     this.seams.outbox.clear();
-    return answer.status === 200 ? answer.body : null;
   }
 
   /**

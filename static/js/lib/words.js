@@ -10,6 +10,7 @@ export const WORDS = {
   sent_at_once: "Your message is sent at once.",
   cannot_change: "Your message cannot be changed.",
   next: "Next round",
+  next_practice: "Next practice round",
   practice_over: "Start the rounds",
   block_over: "Continue",
 };
@@ -151,7 +152,7 @@ function driverResult(view) {
  * @param {RoundView} view
  */
 export function onward(view) {
-  if (view.phase === "practice") return WORDS.practice_over;
+  if (view.phase === "practice") return view.number < view.of ? WORDS.next_practice : WORDS.practice_over;
   return view.over?.last ? WORDS.block_over : WORDS.next;
 }
 
