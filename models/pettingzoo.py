@@ -23,7 +23,7 @@ from models import rng
 from models.envs.api import Environment
 from models.envs.registry import make
 
-RESETS = 32
+RESETS = 17
 """Stream of the seeds of resets without a seed: step is how many there were since the last seed."""
 
 Observation = NDArray[np.float32]
