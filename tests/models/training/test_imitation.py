@@ -1,0 +1,67 @@
+"""The rule that the warm start imitates: it drives well, and careful where it says so."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from models import rollout
+from models.envs import registry
+from models.envs.traffic_junction import BRAKE, GAS
+from models.training.imitation import intent, labels
+
+
+class Rule:
+    name = "rule"
+
+    def actions(self, env, state):
+        return labels(env, state)
+
+
+@pytest.fixture
+def env():
+    return registry.make("traffic_junction/medium")
+
+
+def placed(env, *cars):
+    """One episode with cars (route, position)."""
+    state = env.init(np.zeros(1, np.uint64))
+    alive, route, position = state.alive.copy(), state.route.copy(), state.position.copy()
+    for seat, (way, place) in enumerate(cars):
+        alive[0, seat], route[0, seat], position[0, seat] = True, way, place
+    return replace(state, alive=alive, route=route, position=position)
+
+
+def test_the_rule_hardly_ever_crashes(env):
+    played = rollout.episodes(env, Rule(), np.arange(400, dtype=np.uint64))
+    assert played.success.mean() > 0.99
+    human = rollout.trials(rollout.episodes(env, Rule(), np.arange(200, dtype=np.uint64), "human"))
+    assert human.arrived.mean() > 0.99
+
+
+def test_a_free_road_means_gas_and_an_empty_seat_brakes(env):
+    assert labels(env, placed(env, (0, 3)))[0].tolist() == [GAS] + [BRAKE] * 9
+
+
+def test_a_car_keeps_its_distance_on_the_way_to_the_junction(env):
+    assert labels(env, placed(env, (0, 3), (0, 4)))[0, :2].tolist() == [BRAKE, GAS]
+
+
+def test_a_car_on_its_entry_cell_follows_closely(env):
+    assert labels(env, placed(env, (0, 0), (0, 1)))[0, :2].tolist() == [GAS, GAS]
+
+
+def test_past_the_junction_cars_follow_closely(env):
+    assert labels(env, placed(env, (0, 9), (0, 10)))[0, :2].tolist() == [GAS, GAS]
+
+
+def test_whoever_is_inside_the_junction_goes_first(env):
+    inside, outside = (0, 6), (6, 5)  # from the top, straight, at (6, 6); from the left, about to enter (7, 6)
+    state = placed(env, outside, inside)
+    assert intent(env, state)[0, 0] == intent(env, state)[0, 1]
+    assert labels(env, state)[0, :2].tolist() == [BRAKE, GAS]
+
+
+def test_a_car_about_to_leave_intends_no_cell(env):
+    state = placed(env, (0, 13), (1, 12), (1, 11))
+    assert intent(env, state)[0, :3].tolist() == [-1, -1, env.routes[1][12]]
