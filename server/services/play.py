@@ -12,7 +12,7 @@ from typing import Any
 from server.domain import canonical, events, trial
 from server.domain.errors import BadInputError, NotFoundError, StaleError
 from server.domain.participation import Round, page_kind
-from server.domain.view import Place, View, roads, saw, view_for
+from server.domain.view import Heard, Place, View, roads, saw, view_for
 from server.services import fold, pages
 from server.services.fold import Running
 from server.services.lab import Lab
@@ -37,6 +37,7 @@ class Kept:
     """What the cache holds for (trial id, digest of the last event)."""
 
     running: Running
+    heard: Heard
     place: Place
 
 
@@ -77,8 +78,8 @@ def begin_round(db: DbSession, lab: Lab, session: Session, planned: Round) -> Tr
     spec = spec_of(lab, session, planned)
     running, said = fold.begin(lab, spec)
     running = replace(running, trial=trial.spoken(running.trial, said))
-    now_utc = lab.now_utc()
-    body = canonical.dumps(events.start_body(spec, said, saw(running.trial, running.heard), now_utc))
+    heard, now_utc = running.heard, lab.now_utc()
+    body = canonical.dumps(events.start_body(spec, said, saw(running.trial, heard), now_utc))
     row = TrialRow(
         id=f"{participant.id}-{planned.round:03d}",
         participant_id=participant.id,
@@ -105,7 +106,7 @@ def begin_round(db: DbSession, lab: Lab, session: Session, planned: Round) -> Tr
         return there
     trials.add(db, row)
     event_rows.append(db, EventRow(row.id, 0, body, row.digest, now_utc))
-    lab.cache.put((row.id, row.digest), Kept(running, place_of(planned)))
+    lab.cache.put((row.id, row.digest), Kept(running, heard, place_of(planned)))
     return row
 
 
@@ -134,27 +135,25 @@ def decide(
     kept = current(db, lab, row)
     if not kept.running.trial.can(action):
         raise BadInputError(f"action: {action} is not on offer")
-    after, event, running = step(lab, row, kept.running, action, timing)
+    after, event, kept = step(lab, row, kept, action, timing)
     if not event_rows.append(db, event):
         newest = trials.of_round(db, participant.id, round)
         assert newest is not None
         return answered(db, lab, newest, seq, action, timing)
     trials.moved_on(db, after)
     keep_seen(db, lab, participant)
-    kept = Kept(running, kept.place)
     lab.cache.put((after.id, after.digest), kept)
     return shown(kept, seq)
 
 
 def step(
-    lab: Lab, row: TrialRow, running: Running, action: int, timing: Mapping[str, Any]
-) -> tuple[TrialRow, EventRow, Running]:
+    lab: Lab, row: TrialRow, kept: Kept, action: int, timing: Mapping[str, Any]
+) -> tuple[TrialRow, EventRow, Kept]:
     """What a decision makes of a trial: its row, the new event, and the trial in memory. Writes nothing."""
-    running, moves, token = fold.play(running, action)
-    now_utc = lab.now_utc()
-    body = canonical.dumps(
-        events.decision_body(action, token, timing, moves, saw(running.trial, running.heard), now_utc)
-    )
+    running, moves, token = fold.play(kept.running, action)
+    heard, now_utc = running.heard, lab.now_utc()
+    seen = saw(running.trial, heard)
+    body = canonical.dumps(events.decision_body(action, token, timing, moves, seen, now_utc))
     digest = events.digest(row.digest, body)
     after = row._replace(
         last_seq=row.last_seq + 1,
@@ -164,7 +163,8 @@ def step(
         progress=running.trial.progress,
         ended_utc=now_utc if running.trial.over else None,
     )
-    return after, EventRow(row.id, after.last_seq, body, digest, now_utc), running
+    event = EventRow(row.id, after.last_seq, body, digest, now_utc)
+    return after, event, Kept(running, heard, kept.place)
 
 
 def answered(
@@ -190,13 +190,14 @@ def current(db: DbSession, lab: Lab, row: TrialRow) -> Kept:
     if kept is None:
         bodies = [canonical.loads(e.body) for e in event_rows.of_trial(db, row.id, row.last_seq)]
         session = session_of(db, lab, participants.by_id(db, row.participant_id))
-        kept = Kept(fold.fold(lab, bodies), place_of(session.plan.rounds[row.round - 1]))
+        running = fold.fold(lab, bodies)
+        kept = Kept(running, running.heard, place_of(session.plan.rounds[row.round - 1]))
         lab.cache.put(key, kept)
     return kept
 
 
 def shown(kept: Kept, seq: int) -> View:
-    return view_for(kept.running.trial, kept.running.heard, kept.place, seq)
+    return view_for(kept.running.trial, kept.heard, kept.place, seq)
 
 
 def keep_seen(db: DbSession, lab: Lab, participant: ParticipantRow) -> None:
