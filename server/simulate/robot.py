@@ -126,7 +126,7 @@ class Robot:
 
 def is_complete(page: pages.Page) -> bool:
     """Whether this is the last page: the one that shows a completion code."""
-    return bool(page.texts.get("completion-code"))
+    return bool(page.texts.get("code"))
 
 
 def page_of(response: httpx.Response) -> httpx.Response:
