@@ -10,6 +10,7 @@ N seats, M rows, A actions.
 Source: Williams 1992; Schulman et al. 2016 (generalised advantage estimation); Karten et al. 2023.
 """
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from models.training.enforcer import Enforcer, silence
 from models.training.similarity import Reader, similarity_loss
 from models.training.unroll import Unrolled
 
+NAMES_WEIGHT = 0.05  # small beside the decoder's loss while names differ little, enough to wake unused ones
 CRASH = 10.0  # what Traffic Junction charges for a shared cell, FACTS of the task
 
 Floats = NDArray[np.float32]
@@ -74,7 +76,7 @@ def gradient_loss(
     if phase.kind == "reinforce":
         parts |= _policy_parts(env, learner, seen, phase, entropy_weight, enforcer)
     if phase.discrete:
-        parts["channel"] = seen.channel_loss
+        parts["channel"] = seen.channel_loss + upkeep_of_names(learner.net, seen)
     if labels is not None:
         weight = phase.policy_weight if phase.kind == "imitate" else phase.imitation_weight
         parts["imitation"] = weight * imitation_loss(
@@ -115,6 +117,26 @@ def _policy_parts(
         log_gate = -nn.functional.binary_cross_entropy_with_logits(seen.gate_logit, gate, reduction="none")
         parts["gate"] = -phase.policy_weight * (advantage * log_gate).mean()
     return parts
+
+
+def upkeep_of_names(net: RecurrentNet, seen: Unrolled) -> Tensor:
+    """What keeps all names of a one-hot channel in use and each choice clear; 0 for other channels.
+
+    log K - I(name; what the speaker knows), with I = H(mean p) - mean H(p) over the rows that can be heard.
+    Source: Krause, Perona, Gomes 2010, regularized information maximization.
+    """
+    if net.architecture.channel != "one-hot":
+        return seen.raw.new_zeros(())
+    each = seen.raw[torch.from_numpy(np.flatnonzero(seen.uttered))].softmax(1)  # (M', K)
+    mean = each.mean(0)
+    information = _entropy(mean) - _entropy(each).mean()
+    missing: Tensor = math.log(len(mean)) - information
+    return NAMES_WEIGHT * missing
+
+
+def _entropy(probability: Tensor) -> Tensor:
+    """In nats, over the last axis."""
+    return -(probability * probability.clamp(min=1e-9).log()).sum(-1)
 
 
 def imitation_loss(logits: Tensor, labels: Tensor, brake_weight: float) -> Tensor:
