@@ -153,7 +153,8 @@ def wilson(hits: int, count: int) -> Measure:
     share, z2 = hits / count, WILSON_Z**2
     middle = (share + z2 / (2 * count)) / (1 + z2 / count)
     half = WILSON_Z / (1 + z2 / count) * np.sqrt(share * (1 - share) / count + z2 / (4 * count**2))
-    return Measure(share, (max(0.0, float(middle - half)), min(1.0, float(middle + half))))
+    low, high = float(middle - half), float(middle + half)
+    return Measure(share, (max(0.0, min(low, share)), min(1.0, max(high, share))))  # rounding aside
 
 
 class Bootstrap:
