@@ -20,6 +20,7 @@ router = APIRouter()
 # What schemathesis and readers are told; the handlers themselves answer with finished bytes.
 ANSWERS: dict[int | str, dict[str, Any]] = {
     200: {"description": "The view of the round, or the page to go to", "content": {"application/json": {}}},
+    400: {"description": "The body is no text", "content": {"application/problem+json": {}}},
     404: {"description": "No such session or round", "content": {"application/problem+json": {}}},
     409: {"description": "Already answered; `view` is current", "content": {"application/problem+json": {}}},
     413: {"description": "Body too large", "content": {"application/problem+json": {}}},
