@@ -11,6 +11,7 @@ from models.policies.bundle import PolicyBundle
 from server.domain.errors import NotFoundError
 from server.services.lab import Lab
 
+SHOWN_MAX = 36
 FAINTEST = 0.02  # of the token's likeliest cell; fainter cells are left out of the picture
 MEASURES = (
     ("success", "Success", "share"),
@@ -135,11 +136,12 @@ def text(value: float, unit: str) -> str:
 
 
 def meanings(bundle: PolicyBundle) -> tuple[tuple[int, int], tuple[TokenMeaning, ...]]:
-    """Rows and columns of the world, and every token that was said, the most used first."""
+    """Rows and columns of the world, and the most used tokens in the order of their numbers."""
     lexicon = bundle.lexicon
     rows, columns = registry.make(bundle.manifest.task).shape
     total = max(1, int(lexicon.uses.sum()))
-    said = [int(token) for token in np.argsort(-lexicon.uses, kind="stable") if lexicon.uses[token] > 0]
+    most = np.argsort(-lexicon.uses, kind="stable")[:SHOWN_MAX]
+    said = sorted(int(token) for token in most if lexicon.uses[token] > 0)
     found = tuple(
         TokenMeaning(
             token,

@@ -7,7 +7,7 @@ from server.services import agents
 from server.services.agents import AgentFacts
 from server.services.studies import TASKS
 from server.web.admin_access import CurrentVisitor, signed_in
-from server.web.admin_frame import frame
+from server.web.admin_frame import frame, minute
 from server.web.admin_pages import AgentCard, AgentPage, AgentsPage
 from server.web.dependencies import CurrentLab
 from server.web.rendering import html
@@ -41,7 +41,7 @@ def show_agent(lab: CurrentLab, visitor: CurrentVisitor, folder: str, name: str)
             ("Started from", found.warm_start),
             ("Seed", str(found.seed)),
             ("Source", found.git_commit[:12]),
-            ("Released", found.created),
+            ("Released", minute(found.created)),
             ("Messages counted", f"{bundle.lexicon.samples:,}"),
         ),
         rows=shape[0],

@@ -29,8 +29,11 @@ def head(study: Study, tab: str = "") -> StudyHead:
 
 
 def minute(utc: str) -> str:
-    """A time that people read."""
-    moment = canonical.utc_moment(utc)
+    """A time that people read; a text that is no time stays as it is."""
+    try:
+        moment = canonical.utc_moment(utc)
+    except ValueError:
+        return utc
     return f"{moment.day} {moment:%b %Y, %H:%M} UTC"
 
 

@@ -112,7 +112,7 @@ def ask_to_close(lab: CurrentLab, visitor: CurrentVisitor, slug: str) -> Respons
     with lab.database.reading() as db:
         study = studies.find(db, slug)
         consequences = (
-            "Nobody can enter any more: new people read that the study has ended.",
+            "Nobody new can enter: they read that the study has ended. Whoever has entered can finish.",
             "What was collected stays, and can be downloaded.",
             "Recruitment on a marketplace is not stopped from here. Stop it there first.",
         )

@@ -61,7 +61,6 @@ def study_line(lab: Lab, study: Study, progress: Progress) -> StudyLine:
     """One row; the counts are those of the mode that the study collects now."""
     row, counts = study.row, people(progress, study.row.mode)
     last = progress.modes[row.mode].last_seen_utc
-    arms = study.definition.arms if study.definition else study.values.get("arms", ())
     return StudyLine(
         slug=row.slug,
         title=row.title,
@@ -69,7 +68,7 @@ def study_line(lab: Lab, study: Study, progress: Progress) -> StudyLine:
         status=row.status,
         mode=row.mode,
         version=f"version {study.version.number}" if study.version else "not launched",
-        arms=len(arms),
+        arms=len(study.definition.arms if study.definition else study.values.get("arms", ())),
         places=study.definition.places if study.definition else 0,
         finished=counts.finished,
         active=counts.active,
