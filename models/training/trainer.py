@@ -137,7 +137,7 @@ class Trainer:
             loss = gradient_loss(self.env, self.learner, seen, phase, entropy, self.enforcer, rule)
             if not torch.isfinite(loss.total):
                 raise TrainingError(
-                    f"loss is {float(loss.total)} in phase {phase.name!r}; {self._last_good()}"
+                    f"loss is {loss.total.item()} in phase {phase.name!r}; {self._last_good()}"
                 )
             self._descend(loss.total)
             self._losses = loss.parts

@@ -89,4 +89,7 @@ def test_every_shipped_recipe_can_be_followed(path):
 
 @pytest.mark.parametrize("kind", [Recipe, Phase])
 def test_every_field_says_what_it_is(kind):
-    assert all(field.description or name in ("model", "start", "decoder", "check") for name, field in kind.model_fields.items())
+    assert all(
+        field.description or name in ("model", "start", "decoder", "check")
+        for name, field in kind.model_fields.items()
+    )

@@ -32,9 +32,7 @@ def test_the_penalty_over_three_updates_is_the_papers():
     second = np.array([0.75])  # R_P = -0.5, unchanged on the mean
     np.testing.assert_allclose(enforcer.penalty(second), [0.1 * abs(-0.5 + 0 + 0.026 * -0.5)])
     enforcer = enforcer.after(second)  # sum -1.0
-    np.testing.assert_allclose(
-        enforcer.penalty(np.array([0.5])), [0.1 * abs(0 + 1.6 * 0.5 + 0.026 * -1.0)]
-    )
+    np.testing.assert_allclose(enforcer.penalty(np.array([0.5])), [0.1 * abs(0 + 1.6 * 0.5 + 0.026 * -1.0)])
 
 
 def test_the_sum_of_errors_stays_within_its_bound():

@@ -56,7 +56,10 @@ def test_past_the_junction_cars_follow_closely(env):
 
 
 def test_whoever_is_inside_the_junction_goes_first(env):
-    inside, outside = (0, 6), (6, 5)  # from the top, straight, at (6, 6); from the left, about to enter (7, 6)
+    inside, outside = (
+        (0, 6),
+        (6, 5),
+    )  # from the top, straight, at (6, 6); from the left, about to enter (7, 6)
     state = placed(env, outside, inside)
     assert intent(env, state)[0, 0] == intent(env, state)[0, 1]
     assert labels(env, state)[0, :2].tolist() == [BRAKE, GAS]
