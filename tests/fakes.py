@@ -1,4 +1,4 @@
-"""Doubles that keep the real seams: an untrained policy with memory, a bundle of it with a real lexicon, a lab."""
+"""Doubles that keep the real seams: a policy with memory, a bundle of it with a real lexicon, a lab."""
 
 import hashlib
 import tomllib
@@ -19,7 +19,6 @@ from server.services.lab import Lab
 from server.services.recent import Recent
 from server.settings import Settings
 from server.storage.database import Database
-
 
 STUDIES = Path(__file__).parents[1] / "server" / "studies"
 HIDDEN = 8
@@ -60,13 +59,13 @@ class FakePolicy:
 
 
 def fake_lexicon(tokens: int, cells: int, seed: int = 0) -> Lexicon:
-    """Token k speaks from two or three cells; the last one, with 16 or more, from anywhere (null)."""
+    """Token k speaks from two or three cells; the last one of many says nothing (null)."""
     draw = np.random.default_rng(seed)
     counts = np.zeros((tokens, cells), np.int64)
     for token in range(tokens):
         counts[token, draw.integers(0, cells, 3)] += 4 * cells
     if tokens > 9:
-        counts[-1] = 40
+        counts[-1] = counts[:-1].sum(0)
     return Lexicon.from_counts(counts, draw.random((tokens, 2)), (0.6, 0.3), seed=seed)
 
 

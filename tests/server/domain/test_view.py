@@ -1,4 +1,4 @@
-"""What a browser may know. The leak test: situations that a participant cannot tell apart give the same bytes."""
+"""What a browser may know. What participants cannot tell apart gives the same bytes: the leak test."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -124,7 +124,7 @@ class Drive:
         return route, int(draw.choice(free))
 
     def said(self, draw: np.random.Generator, slots: Any) -> Said:
-        """The messages heard come from any cars; other cars keep their gates shut, the ghost says anything."""
+        """The messages heard come from any cars; other cars keep their gates shut."""
         tokens, gates = [SILENT] * 10, [False] * 10
         for slot in slots:
             tokens[slot] = int(draw.integers(16))
