@@ -178,7 +178,7 @@ def free_slug(db: DbSession, title: str) -> str:
 
 def judged(values: Mapping[str, Any], lab: Lab) -> tuple[StudyDefinition | None, dict[str, str]]:
     """The definition in `values` if it can be launched here, and a message for each wrong field."""
-    return mistakes_of(values, lambda study: {**dict(contradictions(study)), **misfits(study, lab.offers)})
+    return mistakes_of(values, lambda study: {**misfits(study, lab.offers), **dict(contradictions(study))})
 
 
 def missing_agents(study: Study, lab: Lab) -> set[str]:
@@ -262,9 +262,10 @@ def set_status(db: DbSession, slug: str, status: str) -> None:
 
 def set_mode(db: DbSession, slug: str, mode: str) -> None:
     """Decide whether who enters from now on is live data or a test. Nobody who has entered changes."""
+    study = held(db, slug)
     if mode not in {"live", "test"}:
         raise BadInputError(f"a study is in mode live or test, not {mode!r}")
-    studies.set_mode(db, held(db, slug).row.id, mode)
+    studies.set_mode(db, study.row.id, mode)
 
 
 def ensure_demo_studies(db: DbSession, lab: Lab) -> list[str]:

@@ -74,4 +74,6 @@ def sentence(path: str, text: str, study: StudyDefinition) -> str:
     if text.startswith(("was ", "has ", "needs ", "offers ")):
         subject = "This communication" if parts[-1] == "communication" else "This agent"
         return f"{subject} {text}."
-    return text[0].upper() + text[1:] + "."
+    first = text.split()[0]
+    is_name = not first.isalpha() or first in {arm.name for arm in study.arms}
+    return f"{text if is_name else text[0].upper() + text[1:]}."
