@@ -16,11 +16,20 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import httpx
 import psutil  # type: ignore[import-untyped]
 from itsdangerous import TimestampSigner
+from pydantic import SecretStr
+
+from benchmarks import untrained
+from models.policies import bundle
+from server.domain.study import read
+from server.services import studies
+from server.services.lab import Lab
+from server.settings import PACKAGED_BUNDLES, Settings
+from server.storage import studies as study_rows
 
 DatabaseName = Literal["sqlite", "postgresql"]
 SECRET_KEY = "measurements-only-" + "0" * 32
@@ -55,6 +64,7 @@ class Served:
     database_url: str
     workers: int = 1
     postmaster: int | None = None
+    bundles: Path | None = None
     port: int = field(default_factory=free_port)
     process: subprocess.Popen[bytes] | None = None
 
@@ -70,6 +80,7 @@ class Served:
             "HATLAB_SECRET_KEY": SECRET_KEY,
             "HATLAB_ADMIN_PASSWORD": "measurements only",
             "HATLAB_PUBLIC_URL": self.url,
+            **({"HATLAB_BUNDLES": str(self.bundles)} if self.bundles else {}),
             "OMP_NUM_THREADS": "1",
         }
 
@@ -86,6 +97,31 @@ class Served:
         done = self.hatlab("init")
         if done.returncode:
             raise RuntimeError(f"hatlab init: {done.stdout}{done.stderr}")
+
+    @contextlib.contextmanager
+    def lab(self) -> Iterator[Lab]:
+        """Open the installation in this process, to look at it or to add to it."""
+        settings = Settings(
+            database_url=self.database_url,
+            secret_key=SecretStr(SECRET_KEY),
+            **({"bundles": self.bundles} if self.bundles else {}),  # type: ignore[arg-type]
+        )
+        opened = Lab.open(settings)
+        yield opened
+        opened.database.close()
+
+    def add_study(self, template: str, *, places: int, **changes: Any) -> str:
+        """Launch a study made from a template, with room for many; give its slug."""
+        slug = f"{template}-measured"
+        values = {**studies.template(template), "slug": slug, **changes}
+        values["arms"] = [{**arm, "places": places} for arm in values["arms"]]
+        definition = read(values)
+        with self.lab() as lab, lab.database.writing() as db:
+            db.hold()
+            now_utc = lab.now_utc()
+            row = study_rows.add(db, slug, definition.title, "test", definition.canonical, now_utc)
+            studies.freeze(db, lab, row, definition)
+        return slug
 
     def start(self) -> float:
         """Start serving and wait for the first healthy answer; give the seconds that took."""
@@ -161,8 +197,17 @@ def installed(database: DatabaseName, workers: int | None = None) -> Iterator[Se
         else:
             url, postmaster = stack.enter_context(postgresql(folder / "postgresql"))
             house = Served(folder, url, workers or 2, postmaster)
+        if not released():
+            house.bundles = folder / "bundles"
+            untrained.write(house.bundles)
         house.init()
         yield house
+
+
+def released() -> bool:
+    """Whether this checkout holds the released agents; else agents of the same size take their seats."""
+    found, _ = bundle.find(PACKAGED_BUNDLES)
+    return {size.name for size in untrained.SIZES} <= set(found)
 
 
 @contextlib.contextmanager
