@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from sqlalchemy.event import listen
 
 from models.envs import registry
 from models.policies.api import RandomDraws, Speech
@@ -104,6 +105,12 @@ class FakeClock:
     def __call__(self) -> datetime:
         self.now += self.step
         return self.now
+
+
+def hasty(database: Database) -> Database:
+    """Without waiting for the disk: tests do not lose power."""
+    listen(database.engine, "connect", lambda connection, _: connection.execute("PRAGMA synchronous=OFF"))
+    return database
 
 
 def fake_lab(database: Database, *, cache: int = 64, clock: FakeClock | None = None) -> Lab:

@@ -10,7 +10,7 @@ import pytest
 
 from server.services.lab import Lab
 from server.storage.database import Database
-from tests.fakes import fake_lab
+from tests.fakes import fake_lab, hasty
 
 
 @pytest.fixture(scope="session")
@@ -42,7 +42,7 @@ def database(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Databas
     if request.param == "sqlite":
         path = tmp_path / "hatlab.sqlite3"
         shutil.copy(request.getfixturevalue("migrated_sqlite"), path)
-        made = Database(f"sqlite:///{path}")
+        made = hasty(Database(f"sqlite:///{path}"))
         yield made
         made.close()
         return
@@ -69,7 +69,7 @@ def sqlite_database(migrated_sqlite: Path, tmp_path: Path) -> Iterator[Database]
     """For what does not depend on the database."""
     path = tmp_path / "only.sqlite3"
     shutil.copy(migrated_sqlite, path)
-    made = Database(f"sqlite:///{path}")
+    made = hasty(Database(f"sqlite:///{path}"))
     yield made
     made.close()
 
