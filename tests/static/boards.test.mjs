@@ -127,7 +127,7 @@ test("triangles follow the formula of the notes", () => {
   assert.equal(weight(0.05).opacity.toFixed(3), "0.259");
   const drawing = junctionBoard(driverView({ triangles: [[7, 4, 0.25]] }), ROADS);
   const triangle = only(drawing, "caution").attributes;
-  assert.equal(triangle.opacity, 0.41); // .22 + .78 × .25, to 1/100
+  assert.equal(triangle.opacity, 0.42); // .22 + .78 × .25 = .415, to 1/100
   assert.equal(triangle.transform, "translate(157.5 262.5) scale(0.9917) translate(-12 -12)"); // 35 × .68 / 24
 });
 

@@ -1,0 +1,175 @@
+// @ts-check
+// A real Chromium and what a participant does in it. Used by play.mjs; the assertions are node's own.
+
+import assert from "node:assert/strict";
+import { mkdirSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { createRequire } from "node:module";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { chromium } from "playwright-core";
+
+/** @import { BrowserContext, Page } from "playwright-core" */
+
+const FLAGS = [
+  "--headless",
+  "--no-sandbox",
+  "--disable-gpu",
+  "--disable-quic",
+  "--no-first-run",
+  "--disable-background-networking",
+  "--disable-component-update",
+  "--disable-sync",
+];
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+
+export const SIZES = { large: { width: 1280, height: 720 }, small: { width: 1024, height: 640 } };
+
+/** One participant at one computer. */
+export class Participant {
+  /** @type {string[]} */ errors = [];
+  /** Decisions that the page sent, by round and seq; the same one may be sent more than once. @type {Map<string, string>} */ sent =
+    new Map();
+  shots = 0;
+  #looking = false;
+
+  /**
+   * @param {BrowserContext} context
+   * @param {string} name
+   * @param {string} artefacts
+   */
+  constructor(context, name, artefacts) {
+    this.context = context;
+    this.name = name;
+    this.artefacts = artefacts;
+    context.setDefaultTimeout(20_000);
+  }
+
+  /**
+   * @param {string} name
+   * @param {string} artefacts folder of the screenshots
+   * @param {(participant: Participant) => Promise<void>} visit
+   * @param {{ width: number, height: number }} [viewport]
+   */
+  static async with(name, artefacts, visit, viewport = SIZES.large) {
+    const profile = mkdtempSync(join(tmpdir(), "hatlab-profile-"));
+    mkdirSync(artefacts, { recursive: true });
+    const context = await chromium.launchPersistentContext(profile, {
+      executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+      args: FLAGS,
+      viewport,
+    });
+    const participant = new Participant(context, name, artefacts);
+    try {
+      await visit(participant);
+      assert.deepEqual(participant.errors, [], "the console stays silent");
+    } catch (error) {
+      for (const [i, page] of context.pages().entries()) {
+        await page.screenshot({ path: join(artefacts, `${name}-failed-${i}.png`) }).catch(() => {});
+      }
+      throw error;
+    } finally {
+      await context.close();
+      rmSync(profile, { recursive: true, force: true });
+    }
+  }
+
+  /** A tab whose errors and requests are watched. */
+  async tab() {
+    const page = await this.context.newPage();
+    page.on("pageerror", (error) => this.errors.push(String(error)));
+    page.on("console", (message) => {
+      const text = message.text();
+      // A lost connection and a 409 are part of the tests; Chromium reports every failed request.
+      if (this.#looking) return; // taking a picture and checking it put styles into the page, which the policy refuses
+      if (message.type() === "error" && !/Failed to load resource|net::ERR/.test(text)) this.errors.push(text);
+    });
+    page.on("request", (request) => {
+      if (!request.url().endsWith("/step")) return;
+      const body = request.postData() ?? "";
+      const { round, seq } = JSON.parse(body);
+      this.sent.set(`${round}:${seq}`, body);
+    });
+    return page;
+  }
+
+  /**
+   * A screenshot that is kept, and no accessibility violation.
+   * @param {Page} page
+   * @param {string} what
+   */
+  async look(page, what) {
+    this.shots += 1;
+    const file = `${this.name}-${String(this.shots).padStart(2, "0")}-${what}.png`;
+    this.#looking = true;
+    await page.screenshot({ path: join(this.artefacts, file) });
+    await accessible(page, what);
+    await page.waitForTimeout(100); // console messages come on their own time
+    this.#looking = false;
+  }
+}
+
+/**
+ * axe-core finds nothing. It is run through the debugger, which no content policy stops.
+ * @param {Page} page
+ * @param {string} what
+ */
+export async function accessible(page, what) {
+  await page.evaluate(AXE);
+  const found = await page.evaluate(async () => {
+    // @ts-expect-error axe is the script above
+    const { violations } = await globalThis.axe.run(document, { resultTypes: ["violations"] });
+    return violations.map(
+      (/** @type {any} */ { id, nodes }) => `${id}: ${nodes.map((/** @type {any} */ n) => n.html).join(" | ")}`,
+    );
+  });
+  assert.deepEqual(found, [], `accessibility of ${what}`);
+}
+
+/** @typedef {{ task: string, role: string, phase: string, round: number, seq: number, step: number, over: object | null }} Shown */
+
+/**
+ * What the strip says.
+ * @param {Page} page
+ */
+export const strip = (page) => page.locator("#strip").textContent();
+
+/**
+ * Waits until the round is over and its result can be left.
+ * @param {Page} page
+ */
+export async function result(page) {
+  await page.locator("#strip .button-primary").waitFor();
+  return strip(page);
+}
+
+/**
+ * The steps that the meter shows.
+ * @param {Page} page
+ */
+export async function steps(page) {
+  return Number(await page.locator(".meter .value b").first().textContent());
+}
+
+/**
+ * One key press, and the wait for what follows: another step on the meter, or the end of the round.
+ * @param {Page} page
+ * @param {string} key
+ */
+export async function press(page, key) {
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  const before = await steps(page);
+  await page.keyboard.press(key);
+  await page.waitForFunction((count) => {
+    const shown = document.querySelector(".meter .value b")?.textContent;
+    return Number(shown) > count || document.querySelector("#strip .button-primary");
+  }, before);
+}
+
+/**
+ * Whether the round still takes decisions.
+ * @param {Page} page
+ */
+export async function playing(page) {
+  await page.locator(".key[aria-disabled=false], #strip .button-primary").first().waitFor();
+  return (await page.locator("#strip .button-primary").count()) === 0;
+}

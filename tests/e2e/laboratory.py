@@ -1,0 +1,125 @@
+"""A hatlab of its own for browser tests: small untrained agents, short studies, a real server process."""
+
+import os
+import re
+import socket
+import subprocess
+import sys
+import time
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx
+
+from server.domain import study
+from server.services import studies
+from server.services.lab import Lab
+from server.settings import Settings
+from tests.models.policies.bundles import tiny_bundle
+
+ROOT = Path(__file__).parents[2]
+HATLAB = (str(Path(sys.executable).with_name("hatlab")),)
+READY_S = 60
+
+AGENTS = {
+    "parent_child/prototype-9": ("parent_child", "prototype"),
+    "parent_child/onehot-9": ("parent_child", "one-hot"),
+    "traffic_junction/budget-100": ("traffic_junction/medium", "prototype"),
+}
+SHORT = {
+    "parent-child": {"slug": "short-parent-child", "trials_per_block": 2, "step_limit": 8},
+    "traffic-junction": {"slug": "short-traffic", "trials_per_block": 3, "step_limit": 20},
+}
+PROLIFIC = "https://app.prolific.com/submissions/complete?cc={code}"
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    folder: Path
+    url: str
+    environment: dict[str, str]
+
+    @property
+    def database(self) -> Path:
+        return self.folder / "hatlab.sqlite3"
+
+    def verify(self) -> subprocess.CompletedProcess[str]:
+        return self.hatlab("verify")
+
+    def hatlab(self, *words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            (*HATLAB, *words), env=self.environment, cwd=ROOT, capture_output=True, text=True, check=False
+        )
+
+
+@contextmanager
+def laboratory(folder: Path) -> Iterator[Laboratory]:
+    """A migrated database, two short studies, and a server that answers."""
+    bundles = folder / "bundles"
+    for name, (task, channel) in AGENTS.items():
+        tiny_bundle(bundles, task, name, channel=channel)
+    port = free_port()
+    environment = os.environ | {
+        "HATLAB_DATABASE_URL": f"sqlite:///{folder / 'hatlab.sqlite3'}",
+        "HATLAB_BUNDLES": str(bundles),
+        "HATLAB_ADMIN_PASSWORD": "only for tests, never elsewhere",
+        "HATLAB_PUBLIC_URL": f"http://127.0.0.1:{port}",
+        "OMP_NUM_THREADS": "1",
+    }
+    here = Laboratory(folder, environment["HATLAB_PUBLIC_URL"], environment)
+    made = here.hatlab("init")
+    assert made.returncode == 0, made.stderr
+    shorten(here)
+    with (folder / "server.log").open("w") as log:
+        command = (*HATLAB, "serve", "--port", str(port))
+        server = subprocess.Popen(command, env=environment, cwd=ROOT, stdout=log, stderr=log)
+        try:
+            wait_for(here, server)
+            yield here
+        finally:
+            server.terminate()
+            server.wait(timeout=20)
+
+
+def shorten(here: Laboratory) -> None:
+    """Launch a short study of each task, with one arm per agent that is here."""
+    settings = Settings(database_url=here.environment["HATLAB_DATABASE_URL"], bundles=here.folder / "bundles")
+    lab = Lab.open(settings)
+    with lab.database.writing() as db:
+        for template, changes in SHORT.items():
+            values = tomllib.loads((ROOT / "server" / "studies" / f"{template}.toml").read_text())
+            arms = [arm for arm in values["arms"] if arm["bundle"] in AGENTS]
+            definition = study.read(values | changes | {"arms": arms, "completion_url": PROLIFIC})
+            slug = studies.create(db, lab, definition.model_dump(mode="json"), definition.title, definition.slug)
+            studies.freeze(db, lab, studies.find(db, slug).row.id, definition)
+    lab.database.close()
+
+
+def wait_for(here: Laboratory, server: "subprocess.Popen[bytes]") -> None:
+    deadline = time.monotonic() + READY_S
+    while time.monotonic() < deadline:
+        assert server.poll() is None, (here.folder / "server.log").read_text()
+        try:
+            health = httpx.get(f"{here.url}/healthz", timeout=2).json()
+        except httpx.HTTPError:
+            time.sleep(0.2)
+            continue
+        assert health["ok"], health
+        return
+    raise AssertionError("the server did not answer in time")
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        return int(listener.getsockname()[1])
+
+
+def slugs() -> list[str]:
+    return [str(changes["slug"]) for changes in SHORT.values()]
+
+
+def is_key(text: str) -> bool:
+    return re.fullmatch(r"[A-Za-z0-9_-]{43}", text) is not None

@@ -1,0 +1,340 @@
+// @ts-check
+// `node tests/e2e/play.mjs <scenario> <server> <artefacts>`: one participant from link to code in real Chromium.
+// Prints one JSON line: what the browser sent, for the test to compare with the database.
+
+import assert from "node:assert/strict";
+import { randomBytes } from "node:crypto";
+import { Participant, playing, press, result, SIZES, steps, strip } from "./browser.mjs";
+
+/** @import { Page } from "playwright-core" */
+
+const [scenario = "", server = "", artefacts = ""] = process.argv.slice(2);
+
+/**
+ * @param {string} name
+ * @param {(participant: Participant) => Promise<void>} go
+ * @param {{ width: number, height: number }} [size]
+ */
+async function as(name, go, size) {
+  /** @type {Participant | undefined} */ let who;
+  const visiting = async (/** @type {Participant} */ each) => {
+    who = each;
+    await go(each);
+  };
+  await Participant.with(name, artefacts, visiting, size);
+  return /** @type {Participant} */ (/** @type {unknown} */ (who));
+}
+
+/** Prolific's parameters, for somebody new. */
+const invitation = () =>
+  `PROLIFIC_PID=${randomBytes(12).toString("hex")}&STUDY_ID=s1&SESSION_ID=${randomBytes(12).toString("hex")}`;
+
+/**
+ * Reads the consent page, forgets the tick first, then agrees.
+ * @param {Participant} who
+ * @param {Page} page
+ */
+async function consent(who, page) {
+  await who.look(page, "consent");
+  await page.getByRole("button", { name: "I agree, start" }).click();
+  assert.match(String(await page.locator("#why").textContent()), /tick this box/);
+  assert.equal(await page.evaluate(() => document.activeElement?.getAttribute("name")), "read");
+  await who.look(page, "consent-unticked");
+  await page.keyboard.press("Space");
+  await page.getByRole("button", { name: "I agree, start" }).click();
+  await page.waitForURL(/\/p\//);
+}
+
+/**
+ * Reads how to play; "Next" asks for the keys first.
+ * @param {Participant} who
+ * @param {Page} page
+ * @param {string} what
+ * @param {string[]} keys
+ */
+async function instructions(who, page, what, keys) {
+  await page.locator("#probe").waitFor();
+  await page.getByRole("button", { name: "Next" }).click();
+  assert.match(String(await page.locator("#why").textContent()), /Press/);
+  for (const key of keys) await page.keyboard.press(key);
+  await page.locator("#received .badge").waitFor();
+  await who.look(page, `instructions-${what}`);
+  await page.getByRole("button", { name: "Next" }).click();
+  await page.locator(".board-wrap svg").waitFor();
+}
+
+const ARROWS = ["ArrowUp", "ArrowLeft", "ArrowUp", "ArrowRight", "ArrowRight", "ArrowDown"];
+
+/**
+ * Walks until the round is over.
+ * @param {Page} page
+ */
+async function search(page) {
+  for (let i = 0; await playing(page); i += 1) await press(page, ARROWS[i % ARROWS.length] ?? "ArrowUp");
+  return result(page);
+}
+
+/**
+ * Goes (with a brake now and then) until the round is over.
+ * @param {Page} page
+ */
+async function drive(page) {
+  for (let i = 0; await playing(page); i += 1) await press(page, i % 5 === 3 ? "f" : "j");
+  return result(page);
+}
+
+/**
+ * On to what follows the finished round.
+ * @param {Page} page
+ */
+async function onward(page) {
+  const before = await page.locator("#far").textContent();
+  await page.keyboard.press("Space");
+  await page.waitForFunction(
+    (text) => /** @type {HTMLElement | null} */ (document.querySelector("#far"))?.textContent !== text,
+    before,
+  );
+}
+
+/** @param {string} base */
+async function parentChild(base) {
+  return as("parent-child", async (who) => {
+    const page = await who.tab();
+    await page.goto(`${base}/s/short-parent-child?${invitation()}`);
+    await consent(who, page);
+    for (let block = 0; block < 2; block += 1) {
+      await page.locator("#probe").waitFor();
+      const role = await page.locator("#probe").getAttribute("data-role");
+      await instructions(who, page, String(role), role === "parent" ? ["ArrowLeft"] : ["4"]);
+      if (role === "parent") await asParent(who, page);
+      else await asChild(who, page);
+    }
+    await complete(who, page);
+  });
+}
+
+/**
+ * Practice and two rounds; the page is loaded again in the middle of the first, and at its end.
+ * @param {Participant} who
+ * @param {Page} page
+ */
+async function asParent(who, page) {
+  assert.match(String(await strip(page)), /does not count/);
+  await press(page, "ArrowUp");
+  await who.look(page, "parent-practice");
+  await search(page);
+  await who.look(page, "parent-practice-over");
+  await onward(page);
+  await who.look(page, "parent-round");
+  await page.keyboard.press("ArrowLeft");
+  await press(page, "ArrowUp");
+  if (await playing(page)) {
+    const before = [await steps(page), await page.locator(".board-wrap svg").getAttribute("aria-label")];
+    await page.reload();
+    await page.locator(".board-wrap svg").waitFor();
+    assert.deepEqual(
+      [await steps(page), await page.locator(".board-wrap svg").getAttribute("aria-label")],
+      before,
+      "same step after a reload",
+    );
+  }
+  const said = await search(page);
+  await who.look(page, "parent-round-over");
+  await page.reload();
+  assert.equal(await result(page), said, "a reload shows the end again");
+  await onward(page);
+  await search(page);
+  await page.keyboard.press("Space");
+}
+
+/**
+ * Practice and two rounds: one by digit, one by a click on the plane.
+ * @param {Participant} who
+ * @param {Page} page
+ */
+async function asChild(who, page) {
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await who.look(page, "child-practice");
+  await page.keyboard.press("5");
+  await result(page);
+  await onward(page);
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await page.locator("[data-number='3']").hover();
+  await who.look(page, "child-round");
+  await page.keyboard.press("3");
+  await page.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("Replay"));
+  await who.look(page, "child-replay");
+  await result(page);
+  await who.look(page, "child-round-over");
+  await onward(page);
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await page.locator("[data-number='7']").click();
+  await result(page);
+  await page.keyboard.press("Space");
+}
+
+/**
+ * The code, and the way back that would go by itself.
+ * @param {Participant} who
+ * @param {Page} page
+ */
+async function complete(who, page) {
+  await page.locator("#code").waitFor();
+  await page.getByRole("button", { name: "Stay on this page" }).click();
+  assert.match(String(await page.locator("#code").textContent()), /\S{4,}/);
+  assert.match(String(await page.locator("#return").getAttribute("href")), /^https:\/\/app\.prolific\.com\//);
+  await who.look(page, "complete");
+  await page.reload();
+  await page.locator("#code").waitFor();
+}
+
+/** @param {string} base */
+async function traffic(base) {
+  return as(
+    "traffic",
+    async (who) => {
+      const page = await who.tab();
+      await page.goto(`${base}/s/short-traffic?${invitation()}`);
+      await consent(who, page);
+      await instructions(who, page, "driver", ["f", "j"]);
+      await press(page, "j");
+      await who.look(page, "driver-practice");
+      await drive(page);
+      await who.look(page, "driver-practice-over");
+      await onward(page);
+      await who.look(page, "driver-round");
+      await offline(who, page);
+      await drive(page);
+      await who.look(page, "driver-round-over");
+      await onward(page);
+      const newer = await secondTab(who, page);
+      await drive(newer);
+      await onward(newer);
+      await drive(newer);
+      await newer.keyboard.press("Space");
+      await complete(who, newer);
+    },
+    SIZES.small,
+  );
+}
+
+/**
+ * The network goes and comes back: the action is kept, and the board stays.
+ * @param {Participant} who
+ * @param {Page} page
+ */
+async function offline(who, page) {
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  const before = await steps(page);
+  await who.context.setOffline(true);
+  await page.keyboard.press("f");
+  await page.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("Connection lost"));
+  await who.look(page, "driver-connection-lost");
+  await page.keyboard.press("f");
+  await page.waitForTimeout(1200);
+  assert.equal(await steps(page), before, "nothing moves without the server");
+  await who.context.setOffline(false);
+  await page.waitForFunction(
+    (count) => Number(document.querySelector(".meter .value b")?.textContent) === count,
+    before + 1,
+  );
+  assert.equal(await page.locator("body.paused").count(), 0);
+}
+
+/**
+ * The same session in a second tab: the first stops and says so.
+ * @param {Participant} who
+ * @param {Page} page
+ */
+async function secondTab(who, page) {
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await press(page, "f");
+  const newer = await who.tab();
+  await newer.goto(page.url());
+  await newer.locator(".key[aria-disabled=false]").first().waitFor();
+  assert.equal(await steps(newer), await steps(page), "the newer tab goes on at the same step");
+  await page.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("Open in another tab"));
+  await who.look(page, "driver-second-tab");
+  const before = await steps(page);
+  await page.keyboard.press("f");
+  await page.waitForTimeout(300);
+  assert.equal(await steps(page), before, "the older tab takes no keys");
+  return newer;
+}
+
+/** @param {string} base */
+async function decline(base) {
+  return as("decline", async (who) => {
+    const page = await who.tab();
+    await page.goto(`${base}/s/short-traffic`);
+    await page.getByRole("button", { name: "I do not want to take part" }).click();
+    await page.locator("main.done h1").waitFor();
+    await who.look(page, "declined");
+    await page.goto(`${base}/s/no-such-study`);
+    await who.look(page, "unknown-study");
+    await page.goto(`${base}/p/${"x".repeat(43)}`);
+    await who.look(page, "unknown-session");
+    await page.goto(`${base}/s/short-traffic?assignmentId=ASSIGNMENT_ID_NOT_AVAILABLE&hitId=h1`);
+    await who.look(page, "preview");
+  });
+}
+
+/**
+ * The server has the step but its answer never arrives; then the page is loaded again while a step is under way.
+ * @param {string} base
+ */
+async function lostAnswer(base) {
+  return as("lost-answer", async (who) => {
+    const page = await who.tab();
+    await page.goto(`${base}/s/short-traffic?${invitation()}`);
+    await consent(who, page);
+    await instructions(who, page, "again", ["f", "j"]);
+    let swallowed = 0;
+    await page.route("**/step", async (route) => {
+      if (swallowed >= 2) return route.continue();
+      swallowed += 1;
+      await route.fetch();
+      await route.abort();
+    });
+    await press(page, "j");
+    assert.equal(swallowed, 2);
+    assert.equal(await steps(page), 1, "one press is one step, however often it was sent");
+    await page.unroute("**/step");
+    await page.route("**/step", (route) => route.abort());
+    await page.keyboard.press("j");
+    await page.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("Connection lost"));
+    await page.unroute("**/step");
+    await page.reload();
+    await page.locator(".key[aria-disabled=false]").first().waitFor();
+    assert.equal(await steps(page), 2, "the kept step was sent after the reload");
+    await drive(page);
+  });
+}
+
+/** @param {string} base */
+async function smallWindow(base) {
+  return as("small-window", async (who) => {
+    const page = await who.tab();
+    await page.goto(`${base}/s/short-traffic?${invitation()}`);
+    await consent(who, page);
+    await instructions(who, page, "small", ["f", "j"]);
+    await press(page, "j");
+    await page.setViewportSize({ width: 900, height: 640 });
+    await page.locator("#cover").waitFor();
+    await who.look(page, "too-small");
+    await page.keyboard.press("j");
+    await page.setViewportSize(SIZES.small);
+    await page.locator("#cover").waitFor({ state: "hidden" });
+    assert.equal(await steps(page), 1, "a covered board takes no keys");
+    await press(page, "j");
+    assert.equal(await steps(page), 2);
+  });
+}
+
+/** @type {Record<string, (server: string) => Promise<Participant>>} */
+const SCENARIOS = { parent_child: parentChild, traffic, decline, lost_answer: lostAnswer, small_window: smallWindow };
+
+const visit = SCENARIOS[scenario];
+assert.ok(visit, `no scenario ${scenario}; there are ${Object.keys(SCENARIOS).join(", ")}`);
+const participant = await visit(server);
+console.log(JSON.stringify({ scenario, sent: [...participant.sent.values()].map((body) => JSON.parse(body)) }));
