@@ -74,12 +74,12 @@ def end_expired_sessions(db: DbSession, now_utc: str) -> None:
 def add_attempt(db: DbSession, source: str, username: str, at_utc: str) -> int:
     """An attempt counts as failed until `attempt_succeeded`; the id to call that with."""
     statement = insert(login_attempt).returning(login_attempt.c.id)
-    row = {"source": source, "username": username, "succeeded": 0, "at_utc": at_utc}
+    row = {"source": source, "username": username, "succeeded": False, "at_utc": at_utc}
     return int(db.write(statement, row).scalar_one())
 
 
 def attempt_succeeded(db: DbSession, attempt_id: int) -> None:
-    db.write(update(login_attempt).where(login_attempt.c.id == attempt_id).values(succeeded=1))
+    db.write(update(login_attempt).where(login_attempt.c.id == attempt_id).values(succeeded=True))
 
 
 def forget_attempt(db: DbSession, attempt_id: int) -> None:
@@ -103,7 +103,7 @@ def failures_since(
     if username is not None:
         conditions.append(login_attempt.c.username == username)
     if source is not None and username is not None:
-        last = select(func.max(login_attempt.c.id)).where(*conditions, login_attempt.c.succeeded == 1)
+        last = select(func.max(login_attempt.c.id)).where(*conditions, login_attempt.c.succeeded.is_(True))
         conditions.append(login_attempt.c.id > func.coalesce(last.scalar_subquery(), 0))
-    failed = select(login_attempt.c.at_utc).where(*conditions, login_attempt.c.succeeded == 0)
+    failed = select(login_attempt.c.at_utc).where(*conditions, login_attempt.c.succeeded.is_(False))
     return [at for (at,) in db.read(failed.order_by(login_attempt.c.at_utc))]
