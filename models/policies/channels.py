@@ -56,7 +56,7 @@ class PrototypeChannel(nn.Module):
 
     def forward(self, raw: Tensor) -> Utterance:
         token = self.nearest(raw.detach())
-        prototype = self.codebook[token]  # (R, D)
+        prototype = nn.functional.embedding(token, self.codebook)  # (R, D)
         pull = (prototype - raw.detach()).square().sum(1)
         commit = (raw - prototype.detach()).square().sum(1)
         return Utterance(token, straight_through(prototype.detach(), raw), pull + COMMITMENT * commit)

@@ -103,7 +103,7 @@ class Mind:
 
     def memories(self) -> Tensor:
         """What every seat remembers, (B*N, memory)."""
-        return self._rows[torch.from_numpy(self._row_of)]
+        return self._rows.index_select(0, torch.from_numpy(self._row_of))
 
     def speak(
         self, state: Any, living: Bools, generator: torch.Generator | None
@@ -114,7 +114,7 @@ class Mind:
         observation = self.env.observe(state).reshape(-1, self.env.observation_size)[place]
         draws = torch.rand(len(place), 2, generator=generator) if generator is not None else None
         said = self.net.speak(
-            self._rows[torch.from_numpy(row)],
+            self._rows.index_select(0, torch.from_numpy(row)),
             torch.from_numpy(observation),
             draws,
             discrete=self.manner.discrete,
@@ -133,8 +133,8 @@ class Mind:
         episode = where // self.env.agents
         total = message.new_zeros(self.batch, message.shape[1]).index_add(0, episode, message)
         count = gate.new_zeros(self.batch).index_add(0, episode, gate)
-        others = count[episode] - gate
-        return (total[episode] - message) / others.clamp(min=1).unsqueeze(1)
+        others = count.index_select(0, episode) - gate
+        return (total.index_select(0, episode) - message) / others.clamp(min=1).unsqueeze(1)
 
     def _hold(self, where: Tensor, message: Tensor, gate: Tensor) -> tuple[Tensor, Tensor]:
         if self._held is None:
@@ -143,7 +143,7 @@ class Mind:
                 message.new_zeros(seats, message.shape[1]).index_copy(0, where, message),
                 gate.new_zeros(seats).index_copy(0, where, gate),
             )
-        return self._held[0][where], self._held[1][where]
+        return self._held[0].index_select(0, where), self._held[1].index_select(0, where)
 
     def keep(self, place: NDArray[np.int64], memory: Tensor) -> None:
         """Remember the rows (R, memory) of this step; everybody else forgets."""

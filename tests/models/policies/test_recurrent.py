@@ -121,5 +121,5 @@ def test_what_is_heard_changes_what_is_done():
 
 @pytest.mark.parametrize(("field", "value"), [("gate", "ajar"), ("hidden", 0), ("actions", 0)])
 def test_sizes_that_cannot_be_are_refused(field, value):
-    with pytest.raises(ValueError, match="gate|at least 1"):
+    with pytest.raises(ValueError, match=r"gate|at least 1"):
         replace(SMALL, **{field: value})
