@@ -119,7 +119,7 @@ def trials(rollout: Rollout) -> Trials:
     home = np.where(completed.any(0), completed.argmax(0), last + 1)
     steps = np.minimum(np.minimum(hit, home), last).astype(np.int32)
     during = np.arange(last + 1)[:, None] <= steps
-    others = (rollout.collided[..., :-1].sum(2) >= np.where(collided, 1, 2)) & during
+    others = (rollout.collided[..., :-1].sum(2) >= 2) & during
     return Trials(home < hit, (hit < home) & (hit <= last), steps, others.any(0))
 
 
