@@ -154,7 +154,10 @@ def create(db: DbSession, lab: Lab, values: Mapping[str, Any], title: str, slug:
     if wrong:
         raise DefinitionError(wrong)
     draft = canonical.dumps({**values, "title": named, "slug": chosen})
-    studies.add(db, chosen, named, "test", draft, lab.now_utc())
+    try:
+        studies.add(db, chosen, named, "test", draft, lab.now_utc())
+    except studies.SlugTakenError as error:  # PostgreSQL: somebody took it since we looked
+        raise DefinitionError({"slug": taken(chosen)}) from error
     return chosen
 
 
@@ -162,8 +165,12 @@ def slug_mistake(db: DbSession, slug: str) -> str | None:
     if not SLUG.fullmatch(slug):
         return f"Use small letters, digits and hyphens, at most {SLUG_MAX}."
     if slug in RESERVED or studies.by_slug(db, slug):
-        return f"{slug} is taken. Choose another one."
+        return taken(slug)
     return None
+
+
+def taken(slug: str) -> str:
+    return f"{slug} is taken. Choose another one."
 
 
 def free_slug(db: DbSession, title: str) -> str:

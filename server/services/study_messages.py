@@ -20,6 +20,9 @@ SENTENCES = {
     "none_required": "Leave this empty.",
     "string_too_long": "Use at most {max_length} characters.",
     "int_parsing": "Enter a whole number.",
+    "int_type": "Enter a whole number.",
+    "float_type": "Enter a number, such as 0.5.",
+    "string_type": "Fill this in.",
     "int_parsing_size": "Enter a smaller number.",
     "int_from_float": "Enter a whole number.",
     "float_parsing": "Enter a number, such as 0.5.",
@@ -63,7 +66,7 @@ def sentence_of(error: ErrorDetails) -> str:
         blank = not str(error["input"]).strip()
         return "Fill this in." if blank else PATTERNS.get(last, "This cannot be used here.")
     template = SENTENCES.get(error["type"])
-    return template.format(**error.get("ctx", {})) if template else f"{error['msg']}."
+    return template.format(**error.get("ctx", {})) if template else "This cannot be used here."
 
 
 def sentence(path: str, text: str, study: StudyDefinition) -> str:
@@ -74,6 +77,6 @@ def sentence(path: str, text: str, study: StudyDefinition) -> str:
     if text.startswith(("was ", "has ", "needs ", "offers ")):
         subject = "This communication" if parts[-1] == "communication" else "This agent"
         return f"{subject} {text}."
-    first = text.split()[0]
+    first = text.split(maxsplit=1)[0]
     is_name = not first.isalpha() or first in {arm.name for arm in study.arms}
     return f"{text if is_name else text[0].upper() + text[1:]}."

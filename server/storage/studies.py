@@ -3,9 +3,14 @@
 from typing import NamedTuple
 
 from sqlalchemy import func, insert, select, update
+from sqlalchemy.exc import IntegrityError
 
 from server.storage.database import DbSession
 from server.storage.tables import study, study_version
+
+
+class SlugTakenError(Exception):
+    """Another transaction took the slug first."""
 
 
 class StudyRow(NamedTuple):
@@ -59,7 +64,10 @@ def add(db: DbSession, slug: str, title: str, mode: str, draft: str, created_utc
         "draft": draft,
         "created_utc": created_utc,
     }
-    return int(db.write(insert(study).returning(study.c.id), row).scalar_one())
+    try:
+        return int(db.write(insert(study).returning(study.c.id), row).scalar_one())
+    except IntegrityError as error:
+        raise SlugTakenError(slug) from error
 
 
 def set_draft(db: DbSession, study_id: int, title: str, draft: str) -> None:
