@@ -54,7 +54,7 @@ export class Participant {
     const profile = mkdtempSync(join(tmpdir(), "hatlab-profile-"));
     mkdirSync(artefacts, { recursive: true });
     const context = await chromium.launchPersistentContext(profile, {
-      executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+      executablePath: process.env.HATLAB_CHROMIUM ?? "/usr/bin/chromium",
       args: FLAGS,
       viewport,
     });

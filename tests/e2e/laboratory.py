@@ -1,7 +1,6 @@
 """A hatlab of its own for browser tests: small untrained agents, short studies, a real server process."""
 
 import os
-import re
 import socket
 import subprocess
 import sys
@@ -45,9 +44,6 @@ class Laboratory:
     @property
     def database(self) -> Path:
         return self.folder / "hatlab.sqlite3"
-
-    def verify(self) -> subprocess.CompletedProcess[str]:
-        return self.hatlab("verify")
 
     def hatlab(self, *words: str) -> subprocess.CompletedProcess[str]:
         return subprocess.run(
@@ -93,7 +89,9 @@ def shorten(here: Laboratory) -> None:
             values = tomllib.loads((ROOT / "server" / "studies" / f"{template}.toml").read_text())
             arms = [arm for arm in values["arms"] if arm["bundle"] in AGENTS]
             definition = study.read(values | changes | {"arms": arms, "completion_url": PROLIFIC})
-            slug = studies.create(db, lab, definition.model_dump(mode="json"), definition.title, definition.slug)
+            slug = studies.create(
+                db, lab, definition.model_dump(mode="json"), definition.title, definition.slug
+            )
             studies.freeze(db, lab, studies.find(db, slug).row.id, definition)
     lab.database.close()
 
@@ -115,11 +113,3 @@ def wait_for(here: Laboratory, server: "subprocess.Popen[bytes]") -> None:
 def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         return int(listener.getsockname()[1])
-
-
-def slugs() -> list[str]:
-    return [str(changes["slug"]) for changes in SHORT.values()]
-
-
-def is_key(text: str) -> bool:
-    return re.fullmatch(r"[A-Za-z0-9_-]{43}", text) is not None

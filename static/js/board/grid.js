@@ -1,7 +1,7 @@
 // @ts-check
 // The board of Parent & Lost Child: 490 drawing units square, whatever its size on screen. Pure.
 
-import { h } from "./drawing.js";
+import { h, round } from "./drawing.js";
 import { figure } from "./symbols.js";
 
 /** @import { Cell, ParentView, ChildView, Drawing } from "../lib/types.js" */
@@ -146,14 +146,15 @@ function window(size, [row, column], reach) {
  */
 function area(kind, size, top, bottom, left, right) {
   const u = unit(size);
-  const [x0, x1, y0, y1] = [left, right, top, bottom].map((edge) => MARGIN + edge * u);
+  const [x0, x1] = [MARGIN + left * u, MARGIN + right * u];
+  const [y0, y1] = [MARGIN + top * u, MARGIN + bottom * u];
   const across = Array.from(
     { length: right - left - 1 },
-    (_, i) => `M${num(MARGIN + (left + i + 1) * u)} ${num(y0)}V${num(y1)}`,
+    (_, i) => `M${round(MARGIN + (left + i + 1) * u)} ${round(y0)}V${round(y1)}`,
   );
   const down = Array.from(
     { length: bottom - top - 1 },
-    (_, i) => `M${num(x0)} ${num(MARGIN + (top + i + 1) * u)}H${num(x1)}`,
+    (_, i) => `M${round(x0)} ${round(MARGIN + (top + i + 1) * u)}H${round(x1)}`,
   );
   return [
     h("rect", { class: kind, x: x0, y: y0, width: (right - left) * u, height: (bottom - top) * u }),
@@ -166,20 +167,32 @@ function frame() {
 }
 
 /**
- * The line where someone walked: a ring at the start, a dot at each cell between.
+ * The line where someone walked: a ring at the start, a dot at each cell between (none behind the walker's head).
  * @param {number} size
  * @param {Cell[]} cells
  */
 function trail(size, cells) {
   if (cells.length === 0) return [];
   const points = cells.map((cell) => centre(size, cell));
-  const line = points.map(({ x, y }) => `${num(x)} ${num(y)}`).join("L");
+  const line = points.map(({ x, y }) => `${round(x)} ${round(y)}`).join("L");
   const start = /** @type {{x: number, y: number}} */ (points[0]);
+  const end = /** @type {{x: number, y: number}} */ (points.at(-1));
   return [
     points.length > 1 && h("path", { class: "trail", d: `M${line}` }),
-    ...points.slice(1, -1).map(({ x, y }) => h("circle", { class: "trail-dot", cx: x, cy: y, r: 6 })),
+    ...points
+      .slice(1, -1)
+      .filter((point) => !isAt(point, end))
+      .map(({ x, y }) => h("circle", { class: "trail-dot", cx: x, cy: y, r: 6 })),
     h("circle", { class: "trail-start", cx: start.x, cy: start.y, r: 9 }),
   ].filter((node) => node !== false);
+}
+
+/**
+ * @param {{x: number, y: number}} a
+ * @param {{x: number, y: number}} b
+ */
+function isAt(a, b) {
+  return a.x === b.x && a.y === b.y;
 }
 
 /**
@@ -245,9 +258,4 @@ function missed(size, cell) {
  */
 function same(a, b) {
   return a[0] === b[0] && a[1] === b[1];
-}
-
-/** @param {number | undefined} value */
-function num(value) {
-  return Math.round((value ?? 0) * 100) / 100;
 }

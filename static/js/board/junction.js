@@ -1,7 +1,7 @@
 // @ts-check
 // The board of Traffic Junction: 490 drawing units square. Pure.
 
-import { h } from "./drawing.js";
+import { h, round } from "./drawing.js";
 import { CAUTION, figure } from "./symbols.js";
 
 /** @import { Cell, DriverView, Drawing, Roads } from "../lib/types.js" */
@@ -52,7 +52,7 @@ function label(view) {
  * @param {Cell} cell
  */
 function centre(u, [row, column]) {
-  return { x: num((column + 0.5) * u), y: num((row + 0.5) * u) };
+  return { x: round((column + 0.5) * u), y: round((row + 0.5) * u) };
 }
 
 /**
@@ -126,7 +126,7 @@ function ending(u, view) {
     h("rect", { class: `${kind}-ring`, x: left, y: top, width: side, height: side, rx: 4 }),
     h(
       "g",
-      { class: `${kind}-badge`, transform: `translate(${num(badge.x)} ${num(badge.y)})` },
+      { class: `${kind}-badge`, transform: `translate(${round(badge.x)} ${round(badge.y)})` },
       h("circle", { r: 12 }),
       h("path", { d: mark, class: "badge-mark" }),
     ),
@@ -148,8 +148,8 @@ function ground(size, roads) {
     h("path", {
       class: "road",
       d: [
-        ...rows.map(([a, b]) => `M0 ${num(a * u)}H${SIDE}V${num(b * u)}H0Z`),
-        ...columns.map(([a, b]) => `M${num(a * u)} 0H${num(b * u)}V${SIDE}H${num(a * u)}Z`),
+        ...rows.map(([a, b]) => `M0 ${round(a * u)}H${SIDE}V${round(b * u)}H0Z`),
+        ...columns.map(([a, b]) => `M${round(a * u)} 0H${round(b * u)}V${SIDE}H${round(a * u)}Z`),
       ].join(""),
     }),
     h("path", { class: "cellmark", d: cellmarks(size, rows, columns) }),
@@ -187,10 +187,10 @@ function cellmarks(size, rows, columns) {
   const outside = (/** @type {[number, number][]} */ crossing) => (/** @type {number} */ edge) =>
     crossing.every(([a, b]) => edge <= a || edge >= b);
   const across = rows.flatMap(([a, b]) =>
-    edges.filter(outside(columns)).map((x) => `M${num(x * u)} ${num(a * u)}V${num(b * u)}`),
+    edges.filter(outside(columns)).map((x) => `M${round(x * u)} ${round(a * u)}V${round(b * u)}`),
   );
   const down = columns.flatMap(([a, b]) =>
-    edges.filter(outside(rows)).map((y) => `M${num(a * u)} ${num(y * u)}H${num(b * u)}`),
+    edges.filter(outside(rows)).map((y) => `M${round(a * u)} ${round(y * u)}H${round(b * u)}`),
   );
   return [...across, ...down].join("");
 }
@@ -204,10 +204,10 @@ function cellmarks(size, rows, columns) {
 function kerbs(size, rows, columns) {
   const u = SIDE / size;
   const across = rows.flatMap((band) =>
-    band.flatMap((y) => gaps(size, columns).map(([a, b]) => `M${num(a * u)} ${num(y * u)}H${num(b * u)}`)),
+    band.flatMap((y) => gaps(size, columns).map(([a, b]) => `M${round(a * u)} ${round(y * u)}H${round(b * u)}`)),
   );
   const down = columns.flatMap((band) =>
-    band.flatMap((x) => gaps(size, rows).map(([a, b]) => `M${num(x * u)} ${num(a * u)}V${num(b * u)}`)),
+    band.flatMap((x) => gaps(size, rows).map(([a, b]) => `M${round(x * u)} ${round(a * u)}V${round(b * u)}`)),
   );
   return [...across, ...down].join("");
 }
@@ -220,12 +220,12 @@ function kerbs(size, rows, columns) {
  */
 function lanes(size, rows, columns) {
   const u = SIDE / size;
-  const middle = (/** @type {[number, number]} */ [a, b]) => (b - a === 2 ? [num((a + 1) * u)] : []);
+  const middle = (/** @type {[number, number]} */ [a, b]) => (b - a === 2 ? [round((a + 1) * u)] : []);
   const across = rows.flatMap((band) =>
-    middle(band).flatMap((y) => gaps(size, columns).map(([a, b]) => `M${num(a * u)} ${y}H${num(b * u)}`)),
+    middle(band).flatMap((y) => gaps(size, columns).map(([a, b]) => `M${round(a * u)} ${y}H${round(b * u)}`)),
   );
   const down = columns.flatMap((band) =>
-    middle(band).flatMap((x) => gaps(size, rows).map(([a, b]) => `M${x} ${num(a * u)}V${num(b * u)}`)),
+    middle(band).flatMap((x) => gaps(size, rows).map(([a, b]) => `M${x} ${round(a * u)}V${round(b * u)}`)),
   );
   return [...across, ...down].join("");
 }
@@ -265,9 +265,4 @@ function arrows(size, rows, columns) {
     ends.flatMap((column) => [paint([a, column], TURN.left), paint([a + 1, column], TURN.right)]),
   );
   return [...down, ...across];
-}
-
-/** @param {number} value */
-function num(value) {
-  return Math.round(value * 100) / 100;
 }

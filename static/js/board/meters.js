@@ -1,7 +1,7 @@
 // @ts-check
 // Rows of ticks: steps used, route driven, rounds played. One tick a unit, so that the limit can be seen. Pure.
 
-import { h } from "./drawing.js";
+import { h, round } from "./drawing.js";
 
 const WIDTH = 440;
 const GAP = 3;
@@ -28,9 +28,10 @@ export function meter(done, limit) {
  */
 export function pips(number, of) {
   const step = Math.min(8, 158 / of);
+  const width = step * (of - 0.375);
   return h(
     "svg",
-    { class: "pips", viewBox: "0 0 158 10", "aria-hidden": "true" },
+    { class: "pips", viewBox: `0 0 ${round(width)} 10`, width, "aria-hidden": "true" },
     Array.from({ length: of }, (_, i) => {
       const now = i + 1 === number;
       return h("rect", {

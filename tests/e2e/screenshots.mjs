@@ -1,0 +1,215 @@
+// @ts-check
+// `make screenshots`: the pictures of README and docs, taken from a real server that is played in real Chromium.
+// `node tests/e2e/screenshots.mjs <folder>`; HATLAB names the command (default .venv/bin/hatlab).
+
+import { execFile, spawn } from "node:child_process";
+import { randomBytes } from "node:crypto";
+import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join, resolve } from "node:path";
+import { createInterface } from "node:readline";
+import { promisify } from "node:util";
+import { Participant, playing, press, result } from "./browser.mjs";
+
+/** @import { Page } from "playwright-core" */
+
+const HATLAB = resolve(process.env.HATLAB ?? ".venv/bin/hatlab");
+const FOLDER = resolve(process.argv[2] ?? "docs/images");
+const PASSWORD = randomBytes(12).toString("hex");
+const ROBOTS = 4;
+/** Steps after which the pictures of a round are taken: enough for a path, too few for the end. */
+const STEPS = 5;
+
+/**
+ * A migrated database and a server of its own, for as long as `use` runs.
+ * @param {(url: string, hatlab: (...words: string[]) => Promise<unknown>) => Promise<void>} use
+ */
+async function served(use) {
+  const home = mkdtempSync(join(tmpdir(), "hatlab-pictures-"));
+  const env = {
+    ...process.env,
+    HATLAB_DATABASE_URL: `sqlite:///${join(home, "hatlab.sqlite3")}`,
+    HATLAB_ADMIN_PASSWORD: PASSWORD,
+    OMP_NUM_THREADS: "1",
+  };
+  const hatlab = (/** @type {string[]} */ ...words) => promisify(execFile)(HATLAB, words, { env });
+  await hatlab("init");
+  const server = spawn(HATLAB, ["serve", "--port", "0"], { env, stdio: ["ignore", "pipe", "inherit"] });
+  try {
+    await use(await addressOf(server), hatlab);
+  } finally {
+    server.kill();
+    await new Promise((ended) => server.once("exit", ended));
+    rmSync(home, { recursive: true, force: true });
+  }
+}
+
+/** @param {import("node:child_process").ChildProcessByStdio<null, import("node:stream").Readable, null>} server */
+async function addressOf(server) {
+  for await (const line of createInterface(server.stdout)) {
+    const found = /listens on (\S+)/.exec(line);
+    if (found?.[1]) return found[1];
+  }
+  throw new Error("the server ended before it listened");
+}
+
+/**
+ * @param {Page} page
+ * @param {string} name
+ */
+async function picture(page, name) {
+  await page.screenshot({ path: join(FOLDER, `${name}.png`) });
+  console.log(join(FOLDER, `${name}.png`));
+}
+
+/**
+ * Through consent and instructions, as far as the board.
+ * @param {Page} page
+ * @param {string} link
+ */
+async function enter(page, link) {
+  await page.goto(link);
+  await page.locator("[name=read]").check();
+  await page.getByRole("button", { name: "I agree, start" }).click();
+  await page.waitForURL(/\/p\//);
+}
+
+/** Keys that the instructions ask for. @type {Record<string, string[]>} */
+const PROBE = { parent: ["ArrowUp"], child: ["1"], driver: ["f", "j"] };
+
+/** @param {Page} page */
+async function readInstructions(page) {
+  const role = String(await page.locator("#probe").getAttribute("data-role"));
+  for (const key of PROBE[role] ?? []) await page.keyboard.press(key);
+  await page.locator("#received .badge").waitFor();
+  await page.getByRole("button", { name: "Next" }).click();
+  await page.locator(".board-wrap svg").waitFor();
+  return role;
+}
+
+/** @param {Page} page */
+async function onward(page) {
+  await result(page);
+  const before = await page.locator("#far").textContent();
+  await page.keyboard.press("Space");
+  await page.waitForFunction((text) => document.querySelector("#far")?.textContent !== text, before);
+}
+
+const TOUR = ["ArrowUp", "ArrowUp", "ArrowRight", "ArrowRight", "ArrowDown", "ArrowLeft"];
+
+/**
+ * A walk until the round is over, or for so many steps.
+ * @param {Page} page
+ * @param {string[]} keys
+ * @param {number} [most]
+ */
+async function go(page, keys, most = Number.POSITIVE_INFINITY) {
+  for (let i = 0; i < most && (await playing(page)); i += 1) await press(page, keys[i % keys.length] ?? "");
+}
+
+/** @param {Page} page */
+async function asParent(page) {
+  await go(page, TOUR);
+  await onward(page);
+  await playing(page);
+  await go(page, ["ArrowUp", "ArrowUp", "ArrowRight"], STEPS);
+  await picture(page, "parent");
+  await go(page, TOUR);
+  await picture(page, "parent-over");
+}
+
+/** @param {Page} page */
+async function asChild(page) {
+  await playing(page);
+  await page.keyboard.press("5");
+  await onward(page);
+  await playing(page);
+  await picture(page, "child");
+  await page.keyboard.press("3");
+  await result(page);
+  await picture(page, "child-over");
+}
+
+/**
+ * The blocks of Parent & Lost Child, in whichever order they were drawn; the second is reached by playing the first.
+ * @param {Page} page
+ */
+async function bothRoles(page) {
+  for (let block = 0; block < 2; block += 1) {
+    await page.locator("#probe").waitFor();
+    const role = await readInstructions(page);
+    await (role === "parent" ? asParent(page) : asChild(page));
+    if (block === 0) await finish(page, role);
+  }
+}
+
+/**
+ * The rest of the block, quickly.
+ * @param {Page} page
+ * @param {string} role
+ */
+async function finish(page, role) {
+  for (;;) {
+    await result(page);
+    const last = (await page.locator("#strip .button-primary").textContent()) === "Continue";
+    if (last) break;
+    await onward(page);
+    await playing(page);
+    if (role === "parent") await go(page, TOUR);
+    else await page.keyboard.press("2");
+  }
+  await page.keyboard.press("Space");
+}
+
+/** @param {Page} page */
+async function drive(page) {
+  await readInstructions(page);
+  await go(page, ["j", "f", "j"]);
+  await onward(page);
+  await go(page, ["j"], STEPS - 1);
+  for (let i = 0; i < STEPS && (await page.locator(".caution").count()) < 3; i += 1) await go(page, ["j"], 1);
+  await picture(page, "driver");
+  await go(page, ["j"]);
+  await picture(page, "driver-over");
+}
+
+/**
+ * @param {Page} page
+ * @param {string} url
+ */
+async function admin(page, url) {
+  await page.goto(`${url}/admin`);
+  await page.locator("[name=username]").fill("admin");
+  await page.locator("[name=password]").fill(PASSWORD);
+  await page.keyboard.press("Enter");
+  await page.getByRole("heading", { name: "Studies" }).waitFor();
+  for (const [name, path] of [
+    ["admin-studies", "/admin"],
+    ["admin-build", "/admin/studies/traffic-junction"],
+    ["admin-monitor", "/admin/studies/traffic-junction/monitor?mode=robot"],
+    ["admin-agents", "/admin/agents"],
+  ]) {
+    await page.goto(`${url}${path}`);
+    await picture(page, String(name));
+  }
+}
+
+mkdirSync(FOLDER, { recursive: true });
+await served(async (url, hatlab) => {
+  await hatlab("simulate", "traffic-junction", "--participants", String(ROBOTS), "--seed", "1", "--url", url);
+  const artefacts = join(FOLDER, "failed");
+  await Participant.with("pictures", artefacts, async (who) => {
+    const page = await who.tab();
+    await page.goto(`${url}/s/parent-child`);
+    await picture(page, "consent");
+    await enter(page, `${url}/s/traffic-junction`);
+    await picture(page, "instructions");
+    await drive(page);
+    await enter(page, `${url}/s/parent-child`);
+    await bothRoles(page);
+    await admin(page, url);
+    // Taking a picture puts a style into the page, which its content policy refuses; anything else is a fault.
+    who.errors = who.errors.filter((error) => !/Content Security Policy/.test(error));
+  });
+  rmSync(artefacts, { recursive: true, force: true });
+});
