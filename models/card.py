@@ -20,10 +20,12 @@ ROWS = {
     "human": "human trials (5 to 9 other cars)",
     "human_masked": "human trials, messages masked",
 }
-HOW = (
-    "greedy; 95 % interval in brackets. In human trials arrived, collided and limit are those of the seat "
-    "where a participant sits, driven by the policy; success means that no car at all collided."
-)
+HOW = {
+    "parent_child": "greedy; 95 % interval in brackets. Steps are 20 where the child was not found.",
+    "traffic_junction": "greedy; 95 % interval in brackets. In human trials arrived, collided and limit are "
+    "those of the seat where a participant sits, driven by the policy; success means that no car at all "
+    "collided in the whole episode.",
+}
 COLUMNS = {
     "steps": "steps",
     "found": "found",
@@ -39,13 +41,14 @@ SHARES = {"found", "arrived", "collided", "limit", "success", "message_rate"}
 
 def text(manifest: Manifest, evaluation: dict[str, Any]) -> str:
     """Return the card of a bundle with this manifest and evaluation."""
+    family = manifest.task.split("/")[0]
     parts = [
         f"# {manifest.name}",
-        TASKS[manifest.task.split("/")[0]] + f" (`{manifest.task}`, version {manifest.task_version}).",
+        TASKS[family] + f" (`{manifest.task}`, version {manifest.task_version}).",
         "## What it is",
         _facts(manifest),
         "## How well it does",
-        f"{evaluation['episodes']:,} episodes a row, seed {evaluation['seed']}, {HOW}",
+        f"{evaluation['episodes']:,} episodes a row, seed {evaluation['seed']}, {HOW[family]}",
         _table(evaluation["rows"]),
         "## What its tokens mean",
         _meaning(evaluation["meaning"]),

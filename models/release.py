@@ -19,14 +19,14 @@ from models.evaluate import Question, evaluate
 from models.interpret.summary import interpret, summary
 from models.policies import bundle, scripted
 from models.policies.bundle import Manifest, PolicyBundle
+from models.policies.recurrent import Architecture, RecurrentPolicy
 from models.policies.team import Team
-from models.training import checkpoint
-from models.training.run import run
+from models.training import checkpoint, config
 
 if TYPE_CHECKING:
     from models.envs.api import Environment
     from models.policies.api import Policy
-    from models.training.run import TrainingResult
+    from models.training import Recipe
 
 RECIPE, PROVENANCE = "recipe.toml", "provenance.json"
 SEED = 7
@@ -87,14 +87,14 @@ def release(
     Raises:
         ReleaseError: the run is missing, unfinished, or not fit for people.
     """
-    result = _finished(run_dir)
-    env, policy = registry.make(result.recipe.task), result.policy
-    manifest = _manifest(result, name or result.recipe.name, Provenance.read(run_dir))
+    run = _finished(run_dir)
+    env, policy = registry.make(run.recipe.task), run.policy
+    manifest = _manifest(run, name or run.recipe.name, Provenance.read(run_dir))
     _check_fit(env, policy)
     meaning = interpret(env, policy, SEED, lexicon_episodes)
     evaluation = {**evaluations(env, policy, episodes), "meaning": summary(meaning)}
     text = card.text(manifest, evaluation)
-    return bundle.save(root, manifest, result.policy.weights(), meaning.lexicon, evaluation, text)
+    return bundle.save(root, manifest, policy.weights(), meaning.lexicon, evaluation, text)
 
 
 def evaluations(env: Environment[Any], policy: Policy, episodes: int) -> dict[str, Any]:
@@ -118,20 +118,35 @@ def _plain(measures: dict[str, Any]) -> dict[str, Any]:
     return {name: measure.to_json() for name, measure in measures.items()}
 
 
-def _finished(run_dir: Path) -> TrainingResult:
-    recipe = run_dir / RECIPE
-    if not recipe.exists():
+@dataclass(frozen=True, slots=True)
+class FinishedRun:
+    """What training left: the recipe, its best policy, environment steps."""
+
+    recipe: Recipe
+    policy: RecurrentPolicy
+    steps: int
+
+
+def _finished(run_dir: Path) -> FinishedRun:
+    if not (run_dir / RECIPE).exists():
         raise ReleaseError(f"{run_dir}: not the folder of a run (no {RECIPE}); make one with hatlab train")
     if not (run_dir / checkpoint.FILE).exists():
         raise ReleaseError(f"{run_dir}: nothing was trained yet; run hatlab train --resume")
-    if not checkpoint.read(run_dir).facts["finished"]:
+    recipe, held = config.load(run_dir / RECIPE), checkpoint.read(run_dir)
+    if not held.facts["finished"]:
         raise ReleaseError(f"{run_dir}: training is not finished; run hatlab train --resume")
-    return run(recipe, run_dir, resume=True, progress=False)
+    env, sizes = registry.make(recipe.task), recipe.model.model_dump()
+    architecture = Architecture(observation_size=env.observation_size, actions=env.actions, **sizes)
+    try:
+        policy = RecurrentPolicy.from_weights(architecture, checkpoint.part_of(held.tensors, "best."))
+    except ValueError as error:
+        raise ReleaseError(f"{run_dir}: {error}; its checkpoint is of another recipe") from None
+    return FinishedRun(recipe, policy, int(held.facts["at"]["steps"]))
 
 
-def _manifest(result: TrainingResult, name: str, provenance: Provenance) -> Manifest:
-    recipe = result.recipe
-    sizes = result.policy.architecture.to_dict()
+def _manifest(run: FinishedRun, name: str, provenance: Provenance) -> Manifest:
+    recipe = run.recipe
+    sizes = run.policy.architecture.to_dict()
     channel, gate = sizes.pop("channel"), sizes.pop("gate")
     return Manifest(
         format=bundle.FORMAT,
@@ -143,7 +158,7 @@ def _manifest(result: TrainingResult, name: str, provenance: Provenance) -> Mani
         budget=recipe.budget,
         sizes=sizes,
         seed=recipe.seed,
-        steps_trained=result.steps,
+        steps_trained=run.steps,
         warm_start=recipe.warm_start,
         recipe=recipe.model_dump(mode="json"),
         git_commit=provenance.git_commit,

@@ -37,6 +37,8 @@ INK, SOFT, LINE, ACCENT, ORANGE, HEAT_0, HEAT, NULL = (
 )
 FONT = "Helvetica, Arial, 'DejaVu Sans', sans-serif"
 HEATMAPS_PER_ROW = 9
+FEW = 24
+"""Up to this many tokens each is named and drawn large."""
 TALL = 300
 """Height of a plot in px."""
 
@@ -91,12 +93,12 @@ def prototypes(lexicon: Lexicon) -> Chart:
     ]
     side = 380
     domain_x, domain_y = _square(lexicon)
-    few = lexicon.tokens <= 24
+    few = lexicon.tokens <= FEW
     base = _chart(rows).encode(
         x=_axis("x", f"first component ({_percent(lexicon.explained[0])} of variance)", domain_x),
         y=_axis("y", f"second component ({_percent(lexicon.explained[1])} of variance)", domain_y),
     )
-    dots = base.mark_circle(opacity=0.9, stroke="white", strokeWidth=1).encode(
+    dots = base.mark_circle(opacity=0.9 if few else 0.35, stroke="white", strokeWidth=1).encode(
         color=_kinds(),
         size=alt.value(620) if few else alt.Size("share:Q", scale=alt.Scale(range=[30, 500]), legend=None),
     )
@@ -190,9 +192,9 @@ def distance_scatter(found: Distances) -> Chart:
 
 
 def token_use(lexicon: Lexicon) -> Chart:
-    """Draw how often each token was said, by index up to 24 tokens, else most used first."""
+    """Draw how often each token was said, by index if they are few, else most used first."""
     info = information(lexicon)
-    order = range(lexicon.tokens) if lexicon.tokens <= 24 else np.argsort(-lexicon.uses, kind="stable")
+    order = range(lexicon.tokens) if lexicon.tokens <= FEW else np.argsort(-lexicon.uses, kind="stable")
     rows = [
         {
             "place": place,
@@ -201,7 +203,7 @@ def token_use(lexicon: Lexicon) -> Chart:
             "kind": "null" if lexicon.null[token] else "says where",
         }
         for place, token in enumerate(order)
-        if lexicon.tokens <= 24 or lexicon.uses[token] > 0
+        if lexicon.tokens <= FEW or lexicon.uses[token] > 0
     ]
     bars = (
         _chart(rows)
@@ -211,7 +213,7 @@ def token_use(lexicon: Lexicon) -> Chart:
                 "token:N",
                 sort=[str(row["token"]) for row in rows],
                 title="token",
-                axis=alt.Axis(labelAngle=0),
+                axis=alt.Axis(labelAngle=0, labelOverlap=False),
             ),
             y=alt.Y("share:Q", title="share of messages", axis=alt.Axis(format="%")),
             color=_kinds(),
@@ -224,7 +226,7 @@ def token_use(lexicon: Lexicon) -> Chart:
         f"dashed: an even share; null tokens carry {_percent(info.null_messages)}"
     )
     return (bars + even).properties(
-        width=max(420, 14 * len(rows)), height=220, title=_title("Token use", subtitle)
+        width=max(420, 19 * len(rows)), height=220, title=_title("Token use", subtitle)
     )
 
 
@@ -250,7 +252,7 @@ def null_tokens(lexicon: Lexicon) -> Chart:
         ),
     )
     dots = base.mark_circle(size=90, opacity=0.85).encode(color=_kinds())
-    few = [row for row in rows if lexicon.tokens <= 24 or (row["kind"] == "null" and row["share"] >= 0.01)]
+    few = [row for row in rows if lexicon.tokens <= FEW]
     names = (
         _chart(few)
         .mark_text(dx=9, align="left", fontSize=11, color=INK)
@@ -303,7 +305,10 @@ def calibration_plot(calibration: dict[str, Calibration]) -> Chart:
         f"{spoke.brier_skill:.2f}, coverage {_percent(spoke.coverage)}; "
         f"{spoke.drawn:,} cells in {spoke.trials:,} trials"
     )
-    layers = diagonal + series.mark_line(strokeWidth=1.5) + series.mark_point(filled=True, size=60, opacity=1)
+    marks = series.mark_point(filled=False, strokeWidth=2, opacity=1).encode(
+        size=alt.Size("truth:N", scale=alt.Scale(domain=list(names.values()), range=[50, 130]), legend=None)
+    )
+    layers = diagonal + series.mark_line(strokeWidth=1.5) + marks
     return layers.properties(width=360, height=360, title=_title("Can the triangles be believed?", subtitle))
 
 

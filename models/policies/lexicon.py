@@ -26,10 +26,11 @@ Source: DESIGN section 5.
 """
 
 USES_PER_CELL_MIN = 1.0
-"""Small-sample rule: a token heard less often than once per cell of the world is null; its row is P(cell).
+"""Small-sample rule: a token heard less often than once per cell where anybody spoke is null.
 
-Counts are not smoothed. With n uses the KL of a meaningless token comes out about (C-1)/(2n) nats too high,
-so that a rare token would always seem to mean something; from n = C on that is half a nat at most.
+Counts are not smoothed. With n uses and C such cells the KL of a meaningless token comes out about
+(C-1)/(2n) nats too high, so that a rare token would always seem to mean something; from n = C on it is half
+a nat at most. The row of such a token is P(cell).
 """
 
 
@@ -81,7 +82,7 @@ class Lexicon:
         table = np.asarray(counts, dtype=np.int64)  # (K, C)
         uses = table.sum(axis=1)  # (K,)
         base = base_rate(table)  # (C,)
-        rare = uses < USES_PER_CELL_MIN * table.shape[1]
+        rare = uses < max(1.0, USES_PER_CELL_MIN * np.count_nonzero(table.sum(axis=0)))
         probability = np.where(rare[:, None], base, table / np.maximum(uses, 1)[:, None])
         told = divergence_bits(probability, base)  # (K,)
         return cls(
@@ -178,7 +179,7 @@ def base_rate(counts: NDArray[np.int64]) -> NDArray[np.float64]:
 def entropy_bits(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Entropy of each row of (K, C) probabilities, in bits: (K,)."""
     logs = np.log2(rows, out=np.zeros_like(rows), where=rows > 0)
-    bits: NDArray[np.float64] = np.maximum(0.0, -(rows * logs).sum(axis=1))
+    bits: NDArray[np.float64] = np.abs((rows * logs).sum(axis=1))  # no -0.0
     return bits
 
 

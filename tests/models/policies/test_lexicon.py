@@ -39,9 +39,9 @@ def test_a_token_that_tells_nothing_about_the_place_is_null() -> None:
 
 
 def test_a_token_never_or_rarely_used_is_null_and_claims_only_the_base_rate() -> None:
-    made = lexicon([[100, 0, 0, 0], [0, 0, 100, 0], [0, 0, 0, 3]])
+    made = lexicon([[100, 0, 0, 0], [0, 0, 100, 0], [0, 0, 0, 2]])
     assert made.null.tolist() == [False, False, True]
-    assert made.probability[2] == pytest.approx([100 / 203, 0, 100 / 203, 3 / 203])
+    assert made.probability[2] == pytest.approx([100 / 202, 0, 100 / 202, 2 / 202])
 
 
 def test_the_likelihood_of_a_cell_is_one_minus_the_product_of_the_misses() -> None:
