@@ -54,7 +54,6 @@ class Commands(TyperGroup):
 app = typer.Typer(
     cls=Commands,
     add_completion=False,
-    no_args_is_help=True,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -70,7 +69,7 @@ def hatlab() -> None:
 
 @app.command()
 def init() -> None:
-    """Create or migrate the database; an empty one gets the paper's two studies (test mode) and an admin."""
+    """Create or migrate the database. An empty one gets the paper's two studies (test mode) and an admin."""
     from server.services import accounts, lab, studies
 
     settings = settings_of_environment()
@@ -107,7 +106,7 @@ def verify(
         bool, typer.Option(help="Also let the agents decide again, and count differences.")
     ] = False,
 ) -> None:
-    """Execute every stored trial again, compare with what is stored; exit 1 naming the first difference."""
+    """Replay every stored trial. Compare with what is stored; exit 1 naming the first difference of each."""
     from server.services.verify import verify as check
 
     report = check(open_lab(), study, audit)
@@ -146,7 +145,7 @@ def simulate(
         float | None, typer.Option(min=0.001, help="Decisions a second of each; default: no pause.")
     ] = None,
 ) -> None:
-    """Let robots walk the whole study over HTTP, in mode robot; exit 1 if one of them does not finish."""
+    """Let robots walk the whole study over HTTP. Mode robot; exit 1 if one of them does not finish."""
     from itsdangerous import TimestampSigner
     from rich.console import Console
 
@@ -188,7 +187,7 @@ def secret_key(settings: "Settings") -> str:
 def main() -> None:
     """Run the command line; every bad input becomes one line and exit code 2."""
     try:
-        code = app(standalone_mode=False)
+        code = app(sys.argv[1:] or ["--help"], standalone_mode=False)
     except TyperException as error:
         code = refuse(error.format_message())
     except HatlabError as error:
