@@ -16,13 +16,27 @@ FAINTEST = 0.02  # of the token's likeliest cell; fainter cells are left out of 
 MEASURES = (
     ("success", "Success", "share"),
     ("steps", "Steps to find", "number"),
-    ("found", "Found", "share"),
-    ("arrived", "Arrived without collision", "share"),
+    ("arrived", "Arrived", "share"),
     ("message_rate", "Messages sent", "share"),
     ("reward", "Reward", "number"),
-    ("tokens_used", "Tokens in use", "count"),
 )
-SHAPE_OF_UNIT = {"share": "{:.1%}", "number": "{:.2f}", "count": "{:.0f}"}
+CONDITIONS = {
+    "as_trained": "As trained",
+    "masked": "Messages masked",
+    "human": "In participants’ trials",
+    "human_masked": "In participants’ trials, messages masked",
+}
+MEANINGS = (
+    ("null_messages", "Messages that say nothing", "share"),
+    ("distance_r2", "Token distance and place, r²", "number"),
+    ("mutual_information_bits", "Information on the place, bit", "number"),
+)
+CALIBRATION = (
+    ("ece", "Calibration error", "small"),
+    ("brier_skill", "Brier skill", "number"),
+    ("coverage", "Cars under a triangle", "share"),
+)
+FORMATS = {"share": "{:.1%}", "number": "{:.2f}", "small": "{:.4f}"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,16 +45,21 @@ class Figure:
 
     name: str
     value: str
-    range: str
+    range: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Condition:
-    """What was measured under one condition of the evaluation."""
+class Evaluation:
+    """What was measured before release: a table of conditions by measures, and what messages mean.
 
-    name: str
+    `calibration` holds, for each bin, the likelihood that the overlay said and the share that was seen.
+    """
+
     episodes: str
-    figures: tuple[Figure, ...]
+    measures: tuple[str, ...]
+    conditions: tuple[tuple[str, tuple[Figure, ...]], ...]
+    meaning: tuple[Figure, ...]
+    calibration: tuple[tuple[float, float], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +85,8 @@ class AgentFacts:
     tokens: int
     tokens_used: int
     tokens_null: int
-    conditions: tuple[Condition, ...]
+    headline: tuple[Figure, ...]
+    evaluation: Evaluation
     sha256: str
     seed: int
     steps_trained: int
@@ -91,7 +111,8 @@ def find(lab: Lab, name: str) -> PolicyBundle:
 
 
 def facts(bundle: PolicyBundle) -> AgentFacts:
-    manifest, lexicon = bundle.manifest, bundle.lexicon
+    manifest, lexicon, found = bundle.manifest, bundle.lexicon, bundle.evaluation
+    meaning = part(found, "meaning")
     return AgentFacts(
         name=bundle.name,
         environment=manifest.task,
@@ -99,9 +120,10 @@ def facts(bundle: PolicyBundle) -> AgentFacts:
         gate=manifest.gate,
         budget=float(manifest.budget),
         tokens=lexicon.tokens,
-        tokens_used=int((lexicon.uses > 0).sum()),
+        tokens_used=int(meaning.get("tokens_in_use", (lexicon.uses > 0).sum())),
         tokens_null=int((lexicon.null & (lexicon.uses > 0)).sum()),
-        conditions=tuple(conditions(bundle.evaluation)),
+        headline=headline(part(found, "rows")),
+        evaluation=evaluation(found),
         sha256=bundle.sha256,
         seed=manifest.seed,
         steps_trained=manifest.steps_trained,
@@ -111,28 +133,60 @@ def facts(bundle: PolicyBundle) -> AgentFacts:
     )
 
 
-def conditions(evaluation: Mapping[str, Any], name: str = "") -> Iterator[Condition]:
-    """Every part of the evaluation that holds measures, however deep it stands."""
-    if figures := tuple(measured(evaluation)):
-        episodes = evaluation.get("episodes")
-        yield Condition(name or "as released", f"{episodes:,}" if isinstance(episodes, int) else "", figures)
-    for key, part in evaluation.items():
-        if isinstance(part, Mapping) and "mean" not in part:
-            yield from conditions(part, f"{name}, {key}" if name else str(key).replace("_", " "))
+def part(tree: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    """A part of the evaluation; a bundle may lack any."""
+    found = tree.get(key)
+    return found if isinstance(found, Mapping) else {}
 
 
-def measured(part: Mapping[str, Any]) -> Iterator[Figure]:
-    for key, name, unit in MEASURES:
-        value = part.get(key)
-        if isinstance(value, Mapping) and isinstance(value.get("mean"), int | float):
-            low_high = value.get("ci95") or ()
-            yield Figure(name, text(value["mean"], unit), " to ".join(text(end, unit) for end in low_high))
-        elif isinstance(value, int | float):
-            yield Figure(name, text(value, unit), "")
+def headline(rows: Mapping[str, Any]) -> tuple[Figure, ...]:
+    """The figures that tell most: in the world it was trained for, and in the trials that people get."""
+    trained, human = part(rows, "as_trained"), part(rows, "human")
+    chosen = (
+        figure(trained, "success", "Success", "share"),
+        figure(trained, "steps", "Steps to find", "number"),
+        figure(human, "arrived", "Arrived in participants’ trials", "share"),
+    )
+    return tuple(each for each in chosen if each.value)
+
+
+def evaluation(found: Mapping[str, Any]) -> Evaluation:
+    rows, meaning = part(found, "rows"), part(found, "meaning")
+    measures = [each for each in MEASURES if any(each[0] in part(rows, row) for row in rows)]
+    spoke = part(part(meaning, "calibration"), "spoke")
+    said = [figure(meaning, *each) for each in MEANINGS] + [figure(spoke, *each) for each in CALIBRATION]
+    episodes = found.get("episodes")
+    return Evaluation(
+        episodes=f"{episodes:,}" if isinstance(episodes, int) and rows else "",
+        measures=tuple(name for _, name, _ in measures),
+        conditions=tuple(
+            (condition(row), tuple(figure(part(rows, row), *each) for each in measures))
+            for row in sorted(rows, key=lambda row: (*CONDITIONS, row).index(row))
+        ),
+        meaning=tuple(each for each in said if each.value),
+        calibration=tuple((float(each["said"]), float(each["seen"])) for each in spoke.get("bins", ())),
+    )
+
+
+def condition(row: str) -> str:
+    if row.startswith("scripted:"):
+        name, _, start = row.removeprefix("scripted:").partition(" ")
+        return f"Scripted {name.replace('-', ' ')}{', in participants’ trials' if start else ''}"
+    return CONDITIONS.get(row, row.replace("_", " "))
+
+
+def figure(row: Mapping[str, Any], key: str, name: str, unit: str) -> Figure:
+    """A measure as text; without a value where the row has none."""
+    value = row.get(key)
+    measure = value if isinstance(value, Mapping) else {"mean": value, "ci95": row.get(f"{key}_ci95")}
+    mean, low_high = measure.get("mean"), measure.get("ci95") or ()
+    if not isinstance(mean, int | float):
+        return Figure(name, "")
+    return Figure(name, text(mean, unit), " to ".join(text(end, unit) for end in low_high))
 
 
 def text(value: float, unit: str) -> str:
-    return SHAPE_OF_UNIT[unit].format(value).replace("%", " %")
+    return FORMATS[unit].format(value).replace("%", "\u00a0%")
 
 
 def meanings(bundle: PolicyBundle) -> tuple[tuple[int, int], tuple[TokenMeaning, ...]]:

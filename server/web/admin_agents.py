@@ -52,7 +52,6 @@ def show_agent(lab: CurrentLab, visitor: CurrentVisitor, folder: str, name: str)
 
 
 def card(found: AgentFacts) -> AgentCard:
-    first = found.conditions[0].figures if found.conditions else ()
     return AgentCard(
         name=found.name,
         task=TASKS.get(found.environment.split("/")[0], found.environment),
@@ -61,8 +60,8 @@ def card(found: AgentFacts) -> AgentCard:
         tokens=found.tokens,
         tokens_used=found.tokens_used,
         tokens_null=found.tokens_null,
-        figures=first[:3],
-        conditions=found.conditions,
+        figures=found.headline,
+        evaluation=found.evaluation,
         sha256=found.sha256,
         url=f"/admin/agents/{found.name}",
     )

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar
 
 from server.domain.study import StudyDefinition
-from server.services.agents import Condition, Figure, TokenMeaning
+from server.services.agents import Evaluation, Figure, TokenMeaning
 from server.services.monitor import ArmCount, ModeCounts, PersonLine
 from server.services.studies import Blank
 
@@ -209,7 +209,7 @@ class AgentCard:
     tokens_used: int
     tokens_null: int
     figures: tuple[Figure, ...]
-    conditions: tuple[Condition, ...]
+    evaluation: Evaluation
     sha256: str
     url: str
 
