@@ -1,7 +1,7 @@
 """A light load: people who are already playing, over raw HTTP/1.1 on one kept connection each.
 
-The full robots of `hatlab simulate` cost about as much CPU as the server, and both share the machine's
-cores. These players enter as full robots do, play practice, and then send prepared bytes; what they get is read only
+The full robots of `hatlab simulate` cost as much CPU as the server, and both share the machine's cores.
+These players enter as full robots do, play practice, and then send prepared bytes; what they get is read only
 as far as it decides what to send next. Whoever has no round left is followed by the next person.
 """
 
@@ -34,7 +34,7 @@ class Seat(NamedTuple):
     port: int
     round_path: str
     step_path: str
-    index: int
+    person: int
 
 
 async def enter(url: str, host: str, port: int, slug: str, people: int, sign: Any) -> list[Seat]:
@@ -113,7 +113,7 @@ async def player(queue: list[Seat]) -> AsyncIterator[Player]:
     """Connect the next person."""
     seat = queue.pop()
     reader, writer = await asyncio.open_connection(seat.host, seat.port)
-    made = Player(queue, seat, reader, writer, Random(seat.index), Stopwatch("load", seat.index))
+    made = Player(queue, seat, reader, writer, Random(seat.person), Stopwatch("load", seat.person))
     try:
         yield made
     finally:

@@ -4,6 +4,7 @@ Exit code 0: done; 1: the check failed; 2: bad input, said in one line on stderr
 imported by the command that needs it; `hatlab serve` never loads training.
 """
 
+import gc
 import sys
 from enum import StrEnum
 from pathlib import Path
@@ -126,7 +127,9 @@ def export(
     """Write the study's data as CSV, with a codebook and a manifest."""
     from server.services.export import export as write
 
-    manifest = write(open_lab(), study, mode or (), out, practice=practice)
+    lab = open_lab()
+    gc.freeze()  # millions of short-lived rows are to come: the libraries need not be searched again and again
+    manifest = write(lab, study, mode or (), out, practice=practice)
     for name, facts in manifest["files"].items():
         typer.echo(f"{facts['rows']:>9} rows  {out / name}")
 
