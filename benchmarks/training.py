@@ -1,7 +1,8 @@
 """Environment steps per second of training, on one core: episodes, loss, gradients and the optimiser's step.
 
-Prints the median of several repeats of whole updates, with the slowest and the fastest, and the ratio to the public
-IC3Net code where its speed on the same kind of machine is known (environment steps per CPU-second of one core).
+Prints the median of several repeats of whole updates, with the slowest and the fastest, and the ratio to the
+public IC3Net code where its speed on the same kind of machine is known (environment steps per CPU-second of
+one core).
 
 Run: python benchmarks/training.py [--repeats 5] [--updates 3]
 """
@@ -15,6 +16,7 @@ from typing import Any, NamedTuple
 
 import torch
 
+from models.training.allocation import keep_freed_memory
 from models.training.config import Recipe, parse
 from models.training.run import PACKAGED
 from models.training.trainer import Trainer
@@ -76,9 +78,9 @@ def main() -> None:
     parser.add_argument("--updates", type=int, default=3)
     given = parser.parse_args()
     torch.set_num_threads(1)
-    print(
-        f"Training throughput, one core: {given.repeats} repeats of {given.updates} updates, {EPISODES} episodes each"
-    )
+    keep_freed_memory()
+    size = f"{given.repeats} repeats of {given.updates} updates, {EPISODES} episodes each"
+    print(f"Training throughput, one core: {size}")
     print(f"{'':26}{'env steps/s':>12}{'slowest':>10}{'fastest':>10}{'public code':>13}{'ratio':>8}")
     for case in CASES:
         found = speeds(parse(case.recipe), given.repeats, given.updates)

@@ -53,6 +53,15 @@ class Architecture:
         return asdict(self)
 
 
+class Memory(NamedTuple):
+    """States of the two LSTMs, each (R, H); zeros for a newcomer."""
+
+    hidden1: Tensor
+    cell1: Tensor
+    hidden2: Tensor
+    cell2: Tensor
+
+
 class Said(NamedTuple):
     """What ``RecurrentNet.speak`` makes of R rows, with gradients."""
 
@@ -64,8 +73,10 @@ class Said(NamedTuple):
     """(R,) 0.0 or 1.0"""
     gate_logit: Tensor
     """(R,)"""
-    memory: Tensor
-    """(R, 5H)"""
+    memory: Memory
+    """after the first LSTM"""
+    encoded: Tensor
+    """(R, H) encoded observation, which ``act`` reads too"""
     raw: Tensor
     """(R, D) before the channel"""
     loss: Tensor
@@ -73,10 +84,10 @@ class Said(NamedTuple):
 
 
 class Done(NamedTuple):
-    """What ``RecurrentNet.act`` makes of R rows: action logits (R, A), memory (R, 5H), features (R, F)."""
+    """What ``RecurrentNet.act`` makes of R rows: action logits (R, A), memory, features (R, F)."""
 
     logits: Tensor
-    memory: Tensor
+    memory: Memory
     features: Tensor
 
 
@@ -128,14 +139,10 @@ class RecurrentNet(nn.Module):
         """Floats that the heads read: hidden 2, inbox, encoded observation, match."""
         return 3 * self.architecture.hidden + self.architecture.message
 
-    @property
-    def memory_size(self) -> int:
-        return MEMORY_PARTS * self.architecture.hidden
-
     def speak(
-        self, memory: Tensor, observation: Tensor, draws: Tensor | None = None, *, discrete: bool = True
+        self, memory: Memory, observation: Tensor, draws: Tensor | None = None, *, discrete: bool = True
     ) -> Said:
-        """From memory (R, 5H) and observation (R, O) to message and gate.
+        """From memory and observation (R, O) to message and gate.
 
         Args:
             memory: what ``act`` returned at the last step; zeros for a newcomer.
@@ -143,9 +150,8 @@ class RecurrentNet(nn.Module):
             draws: uniform numbers (R, 2), first for the token, second for the gate; greedy without.
             discrete: False sends the raw vector instead of its prototype (training before quantisation).
         """
-        hidden1, cell1, hidden2, cell2, _ = torch.split(memory, self.architecture.hidden, dim=1)
         encoded = self.encoder(observation)
-        hidden1, cell1 = self.first(encoded, (hidden1, cell1))
+        hidden1, cell1 = self.first(encoded, (memory.hidden1, memory.cell1))
         source = torch.cat((hidden1, encoded), 1)
         raw = self.speech(source)
         if self.architecture.channel != "one-hot":
@@ -159,8 +165,8 @@ class RecurrentNet(nn.Module):
         )
         if self.architecture.channel == "none":
             gate = torch.zeros_like(logit)
-        memory = torch.cat((hidden1, cell1, hidden2, cell2, encoded), 1)
-        return Said(token, message, gate, logit, memory, raw, loss)
+        memory = memory._replace(hidden1=hidden1, cell1=cell1)
+        return Said(token, message, gate, logit, memory, encoded, raw, loss)
 
     def _utter(self, raw: Tensor, draws: Tensor | None, discrete: bool) -> tuple[Tensor, Tensor, Tensor]:
         if isinstance(self.channel, OneHotChannel):
@@ -173,14 +179,13 @@ class RecurrentNet(nn.Module):
             return source.new_full((source.shape[0],), 20.0)  # open with probability 1 - 2e-9
         return self.gate(source).squeeze(1)  # type: ignore[no-any-return]
 
-    def act(self, memory: Tensor, inbox: Tensor) -> Done:
-        """From the memory (R, 5H) that ``speak`` returned and the inbox (R, D) to action logits."""
-        hidden1, cell1, hidden2, cell2, encoded = torch.split(memory, self.architecture.hidden, dim=1)
-        hidden2, cell2 = self.second(torch.cat((hidden1, inbox), 1), (hidden2, cell2))
+    def act(self, memory: Memory, encoded: Tensor, inbox: Tensor) -> Done:
+        """From what ``speak`` returned and the inbox (R, D) to action logits."""
+        heard = torch.cat((memory.hidden1, inbox), 1)
+        hidden2, cell2 = self.second(heard, (memory.hidden2, memory.cell2))
         match = self.match_inbox(inbox) * self.match_own(encoded)
         features = torch.cat((hidden2, inbox, encoded, match), 1)
-        memory = torch.cat((hidden1, cell1, hidden2, cell2, encoded), 1)
-        return Done(self.head(features), memory, features)
+        return Done(self.head(features), memory._replace(hidden2=hidden2, cell2=cell2), features)
 
 
 class RecurrentPolicy:
@@ -201,7 +206,7 @@ class RecurrentPolicy:
         self.channel = net.architecture.channel
         self.tokens = net.architecture.tokens
         self.message_size = net.architecture.message
-        self.hidden_size = net.memory_size
+        self.hidden_size = MEMORY_PARTS * net.architecture.hidden
         self._vectors = _vectors(net)
 
     @classmethod
@@ -235,25 +240,32 @@ class RecurrentPolicy:
         if sampled is not None:
             draws = torch.from_numpy(np.stack([sampled.uniform(len(hidden)) for _ in range(2)], 1))
         with torch.inference_mode():
-            said = self.net.speak(
-                torch.from_numpy(hidden), torch.from_numpy(observation), draws, discrete=self._discrete
-            )
+            memory, _ = self._split(hidden)
+            said = self.net.speak(memory, torch.from_numpy(observation), draws, discrete=self._discrete)
+            after = torch.cat((*said.memory, said.encoded), 1)
         token = said.token.numpy().astype(np.int32)
         gate = (said.gate.numpy() >= 0.5) | self._open_gate
         exact = self._discrete and self.tokens > 0  # a straight-through sum is off by a rounding error
         message = self.vector(token) if exact else said.message.numpy()
-        return Speech(token, gate, message, said.memory.numpy())
+        return Speech(token, gate, message, after.numpy())
 
     def act(
         self, hidden: NDArray[np.float32], inbox: NDArray[np.float32], sampled: RandomDraws | None = None
     ) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
         with torch.inference_mode():
-            done = self.net.act(torch.from_numpy(hidden), torch.from_numpy(inbox))
+            memory, encoded = self._split(hidden)
+            done = self.net.act(memory, encoded, torch.from_numpy(inbox))
+            after = torch.cat((*done.memory, encoded), 1)
             if sampled is None:
                 action = done.logits.argmax(1)
             else:
                 action = pick(done.logits.softmax(1), torch.from_numpy(sampled.uniform(len(hidden))))
-        return action.numpy().astype(np.int32), done.memory.numpy()
+        return action.numpy().astype(np.int32), after.numpy()
+
+    def _split(self, hidden: NDArray[np.float32]) -> tuple[Memory, Tensor]:
+        """LSTM states, and the encoded observation kept between ``speak`` and ``act``."""
+        *states, encoded = torch.from_numpy(hidden).split(self.architecture.hidden, dim=1)  # type: ignore[no-untyped-call]
+        return Memory(*states), encoded
 
     def vector(self, tokens: NDArray[np.int32]) -> NDArray[np.float32]:
         return self._vectors[tokens]

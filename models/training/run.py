@@ -10,6 +10,7 @@ from rich.progress import Progress as Bar
 
 from models.policies.recurrent import RecurrentPolicy
 from models.training import config
+from models.training.allocation import keep_freed_memory
 from models.training.config import Recipe
 from models.training.trainer import Trainer
 
@@ -53,6 +54,7 @@ def run(
     """
     recipe = config.load(recipe_path)
     torch.set_num_threads(1)
+    keep_freed_memory()
     trainer = Trainer(recipe, Path(out_dir), Path(bundles) if bundles else PACKAGED)
     trainer.open(resume)
     with _bar(progress) as bar:

@@ -10,9 +10,9 @@ from models import rng
 from models.envs.api import Environment, join
 from models.envs.starts import human_start
 from models.envs.traffic_junction import TrafficJunction, with_arrival
-from models.policies.recurrent import RecurrentNet
+from models.policies.recurrent import Memory, RecurrentNet
 from models.training.config import Start
-from models.training.unroll import Beginning, Manner, warmed_up
+from models.training.unroll import Beginning, Manner, blank, warmed_up
 
 # Streams over (recipe's seed, update): worlds, arrival probabilities, overrides, torch.
 WORLDS, ARRIVALS, OVERRIDES, TORCH = 11, 12, 13, 14
@@ -58,9 +58,10 @@ def beginning(
         return Beginning(state, None)
     begun = human_start(env, seeds[batch - humans :])
     memory = warmed_up(env, net, begun, manner, draws)
-    nothing = memory.new_zeros((batch - humans) * env.agents, memory.shape[1])
+    nothing = blank(net, (batch - humans) * env.agents)
     human = with_arrival(begun.state, arrival[batch - humans :])
-    return Beginning(join([state, human]), torch.cat((nothing, memory)))
+    both = Memory(*(torch.cat(parts) for parts in zip(nothing, memory, strict=True)))
+    return Beginning(join([state, human]), both)
 
 
 def _arrivals(start: Start, usual: float, draws: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -16,10 +16,12 @@ from torch import Tensor
 
 from models.envs.api import Environment
 from models.envs.starts import HumanStart
-from models.policies.recurrent import RecurrentNet, Said
+from models.policies.recurrent import Memory, RecurrentNet, Said
 
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int32]
+
+FORGOTTEN = -1  # the row of a seat that remembers nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +39,10 @@ class Manner:
 
 
 class Beginning(NamedTuple):
-    """Where episodes begin: the states, and what everybody remembers (B*N, memory) or None for nothing."""
+    """Where episodes begin: the states, and what all B*N seats remember, or None for nothing."""
 
     state: Any
-    memory: Tensor | None
+    memory: Memory | None
 
 
 class Unrolled(NamedTuple):
@@ -82,8 +84,8 @@ class Unrolled(NamedTuple):
     """(T, B, N)"""
     states: tuple[Any, ...]
     """T + 1 states"""
-    memory: Tensor
-    """(B*N, memory) after the last step, without gradient"""
+    memory: Memory
+    """of all B*N seats after the last step, without gradient"""
 
 
 class Mind:
@@ -91,30 +93,38 @@ class Mind:
 
     def __init__(self, env: Environment[Any], net: RecurrentNet, batch: int, manner: Manner) -> None:
         self.env, self.net, self.batch, self.manner = env, net, batch, manner
-        self._rows = torch.zeros(1, net.memory_size)  # the last row is zeros: a newcomer's memory
+        self._rows = blank(net, 1)
         self._row_of = np.zeros(batch * env.agents, np.int64)
         self._speaks = torch.from_numpy(np.tile(env.speaks, batch).astype(np.float32))
         self._held: tuple[Tensor, Tensor] | None = None
 
-    def remember(self, memory: Tensor) -> None:
-        """Start from memories (B*N, memory) instead of zeros."""
-        self._rows = torch.cat((memory, memory.new_zeros(1, memory.shape[1])))
-        self._row_of = np.arange(len(memory))
+    def remember(self, memory: Memory) -> None:
+        """Start from the memories of all B*N seats instead of zeros."""
+        self._rows, self._row_of = memory, np.arange(len(memory.hidden1))
 
-    def memories(self) -> Tensor:
-        """What every seat remembers, (B*N, memory)."""
-        return self._rows.index_select(0, torch.from_numpy(self._row_of))
+    def memories(self) -> Memory:
+        """What all B*N seats remember."""
+        return self._recall(self._row_of)
+
+    def _recall(self, row: NDArray[np.int64]) -> Memory:
+        """The rows of the last step; zeros for -1."""
+        known = torch.from_numpy(row >= 0)
+        index = torch.from_numpy(np.maximum(row, 0))
+        parts = [part.index_select(0, index) for part in self._rows]
+        if not known.all():
+            parts = [part * known.unsqueeze(1) for part in parts]
+        return Memory(*parts)
 
     def speak(
         self, state: Any, living: Bools, generator: torch.Generator | None
     ) -> tuple[NDArray[np.int64], Said]:
         """The living seats (B, N) speak; returns their places (R,) and what they said."""
         place = np.flatnonzero(living)
-        row = np.where(self.env.fresh(state).reshape(-1)[place], len(self._rows) - 1, self._row_of[place])
+        row = np.where(self.env.fresh(state).reshape(-1)[place], FORGOTTEN, self._row_of[place])
         observation = self.env.observe(state).reshape(-1, self.env.observation_size)[place]
         draws = torch.rand(len(place), 2, generator=generator) if generator is not None else None
         said = self.net.speak(
-            self._rows.index_select(0, torch.from_numpy(row)),
+            self._recall(row),
             torch.from_numpy(observation),
             draws,
             discrete=self.manner.discrete,
@@ -145,11 +155,16 @@ class Mind:
             )
         return self._held[0].index_select(0, where), self._held[1].index_select(0, where)
 
-    def keep(self, place: NDArray[np.int64], memory: Tensor) -> None:
-        """Remember the rows (R, memory) of this step; everybody else forgets."""
-        self._rows = torch.cat((memory, memory.new_zeros(1, memory.shape[1])))
-        self._row_of = np.full(self.batch * self.env.agents, len(memory), np.int64)
+    def keep(self, place: NDArray[np.int64], memory: Memory) -> None:
+        """Remember the rows (R) of this step; everybody else forgets."""
+        self._rows = memory if len(place) else blank(self.net, 1)
+        self._row_of = np.full(self.batch * self.env.agents, FORGOTTEN)
         self._row_of[place] = np.arange(len(place))
+
+
+def blank(net: RecurrentNet, rows: int) -> Memory:
+    """Memories of newcomers."""
+    return Memory(*(torch.zeros(rows, net.architecture.hidden) for _ in Memory._fields))
 
 
 Override = Callable[[int, Any, Ints], Ints]
@@ -181,7 +196,16 @@ def unroll(
         state, reward = env.step(state, actions)
         rewards.append(reward)
         states.append(state)
-    return _collect(env, rows, living, rewards, states, mind.memories().detach(), steps.start if steps else 0)
+    memory = Memory(*(part.detach() for part in mind.memories()))
+    return _collect(
+        env,
+        rows,
+        living,
+        rewards,
+        states,
+        memory,
+        steps.start if steps else 0,
+    )
 
 
 class _Rows(NamedTuple):
@@ -199,7 +223,7 @@ def _step(
 ) -> tuple[Ints, _Rows]:
     place, said = mind.speak(state, living, generator if mind.manner.sampled else None)
     inbox = mind.inbox(place, said)
-    done = mind.net.act(said.memory, inbox)
+    done = mind.net.act(said.memory, said.encoded, inbox)
     mind.keep(place, done.memory)
     action = _choose(done.logits, mind.manner, generator)
     actions = np.zeros(living.size, np.int32)
@@ -234,11 +258,11 @@ def _collect(
     living: list[Bools],
     rewards: list[NDArray[np.float32]],
     states: list[Any],
-    memory: Tensor,
+    memory: Memory,
     first: int,
 ) -> Unrolled:
     features = torch.cat([r.features for r in rows])
-    hidden = rows[0].said.memory.shape[1] // 5
+    hidden = rows[0].said.encoded.shape[1]
     step, place = np.concatenate([r.step for r in rows]), np.concatenate([r.place for r in rows])
     uttered = env.speaks[place % env.agents] & ((step == 0) | (not env.message_held))
     losses = torch.cat([r.said.loss for r in rows])[torch.from_numpy(np.flatnonzero(uttered))]
@@ -268,16 +292,17 @@ def _collect(
 @torch.no_grad()
 def warmed_up(
     env: Environment[Any], net: RecurrentNet, begun: HumanStart, manner: Manner, generator: torch.Generator
-) -> Tensor:
-    """Memories (B*N, memory) after a warm-up in which the policy spoke and heard, but other hands drove."""
+) -> Memory:
+    """Memories of all B*N seats after a warm-up: the policy spoke and heard, but other hands drove."""
     batch = len(begun.length)
     mind = Mind(env, net, batch, manner)
-    memory = torch.zeros(batch * env.agents, net.memory_size)
+    memory = blank(net, batch * env.agents)
     for step, (state, _) in enumerate(begun.warmup):
         mind.remember(memory)
         place, said = mind.speak(
             state, env.alive(state) & begun.active(step)[:, None], generator if manner.sampled else None
         )
-        done = net.act(said.memory, mind.inbox(place, said))
-        memory[torch.from_numpy(place)] = done.memory
+        done = net.act(said.memory, said.encoded, mind.inbox(place, said))
+        for kept, after in zip(memory, done.memory, strict=True):
+            kept[torch.from_numpy(place)] = after
     return memory
