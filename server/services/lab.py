@@ -57,8 +57,10 @@ class Lab:
         """
         ready = cls.without_agents(settings)
         from models.policies import bundle as released  # loads torch, which takes seconds
+        from models.policies.serving import serving
 
-        bundles, errors = released.find(settings.bundles)
+        found, errors = released.find(settings.bundles)
+        bundles = {name: replace(bundle, policy=serving(bundle.policy)) for name, bundle in found.items()}
         return replace(ready, bundles=bundles, bundle_errors=errors)
 
     @classmethod
