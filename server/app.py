@@ -5,6 +5,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
 import structlog
+import torch
 from fastapi import FastAPI
 from fastapi.middleware import Middleware
 from fastapi.telemetry import TelemetryConfig
@@ -49,9 +50,16 @@ def create_app(lab: Lab) -> FastAPI:
 
 
 def from_environment() -> FastAPI:
-    """The application of one worker: what `uvicorn` calls as a factory."""
+    """The application of one worker: what `uvicorn` calls as a factory.
+
+    Agents that cannot be loaded are named on stderr, one line each, and left out.
+    """
     log_as_json()
-    return create_app(Lab.open(Settings()))
+    torch.set_num_threads(1)  # one decision is too small to share; workers are what share the load
+    lab = Lab.open(Settings())
+    for error in lab.bundle_errors:
+        print(f"hatlab: agent left out: {error}", file=sys.stderr)
+    return create_app(lab)
 
 
 def log_as_json() -> None:

@@ -1,15 +1,12 @@
 """One server from start to stop: check, listen, say where, run uvicorn."""
 
 import socket
-import sys
 from dataclasses import dataclass
 from typing import Any
 
-import torch
 import uvicorn
 from uvicorn.supervisors import Multiprocess
 
-from server.app import create_app, log_as_json
 from server.domain.errors import BadInputError
 from server.services import studies
 from server.services.lab import Lab
@@ -36,23 +33,22 @@ class Place:
 
 
 def serve(settings: Settings, host: str, port: int, workers: int) -> None:
-    """Serve until stopped.
+    """Serve until stopped. Each worker opens the lab for itself, from the environment's settings.
 
     Raises:
         NotReadyError: the database is not ready.
         BadInputError: the port cannot be had.
     """
-    lab = Lab.open(settings)
+    lab = Lab.without_agents(settings)
     place = listen(host, port)
     announce(lab, place)
-    if workers == 1:
-        log_as_json()
-        torch.set_num_threads(1)
-        uvicorn.Server(config(settings, create_app(lab))).run([place.listener])
-        return
     lab.database.close()
-    place.listener.set_inheritable(True)
-    Multiprocess(config(settings, "server.app:from_environment", workers), [place.listener]).run()
+    made = config(settings, "server.app:from_environment", workers)
+    if workers == 1:
+        uvicorn.Server(made).run([place.listener])
+    else:
+        place.listener.set_inheritable(True)
+        Multiprocess(made, [place.listener]).run()
 
 
 def listen(host: str, port: int) -> Place:
@@ -83,9 +79,7 @@ def config(settings: Settings, app: Any, workers: int = 1) -> uvicorn.Config:
 
 
 def announce(lab: Lab, place: Place) -> None:
-    """Links on stdout; each agent that could not be loaded on stderr."""
-    for error in lab.bundle_errors:
-        print(f"hatlab: agent left out: {error}", file=sys.stderr)
+    """The links. Requests wait in the listener until a worker has loaded the agents."""
     url = lab.settings.public_url if "public_url" in lab.settings.model_fields_set else place.url
     with lab.database.reading() as db:
         rows = [study.row for study in studies.every(db) if study.row.status == "open"]

@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import httpx
 import pytest
 
 from server.cli import MODELS_COMMANDS
@@ -21,15 +22,18 @@ class Shell:
         self.settings = {"HATLAB_DATABASE_URL": f"sqlite:///{folder}/var/hatlab.sqlite3"}
 
     def __call__(self, *words: str, **settings: str) -> subprocess.CompletedProcess[str]:
-        code = "from server.cli import main; main()"
-        return subprocess.run(
-            [sys.executable, "-c", code, *words],
+        with self.started(*words, **settings) as process:
+            out, err = process.communicate(timeout=120)
+        return subprocess.CompletedProcess(words, process.returncode, out, err)
+
+    def started(self, *words: str, **settings: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-c", "from server.cli import main; main()", *words],
             cwd=self.folder,
             env={"PYTHONPATH": str(REPOSITORY), "PATH": "/usr/bin:/bin", **self.settings, **settings},
-            capture_output=True,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
             text=True,
-            check=False,
-            timeout=120,
         )
 
 
@@ -108,6 +112,24 @@ def test_a_port_that_is_taken_is_said_before_anything_starts(hatlab: Shell) -> N
         done = hatlab("serve", "--port", str(taken.getsockname()[1]))
     assert done.returncode == 2
     assert "choose another --port" in done.stderr
+
+
+def test_a_server_says_where_it_is_which_agent_it_left_out_and_stops_when_told(hatlab: Shell) -> None:
+    assert hatlab("init").returncode == 0
+    broken = hatlab.folder / "bundles" / "parent_child" / "broken"
+    broken.mkdir(parents=True)
+    (broken / "manifest.json").write_text("{")
+    with hatlab.started("serve", "--port", "0", HATLAB_BUNDLES=str(hatlab.folder / "bundles")) as server:
+        assert server.stdout is not None
+        lines = [server.stdout.readline() for _ in range(4)]
+        address = lines[0].split()[-1]
+        assert f"{address}/s/parent-child" in lines[1]
+        assert f"{address}/admin" in lines[3]
+        assert httpx.get(f"{address}/healthz", timeout=60).json()["bundle_errors"]
+        server.terminate()
+        _, errors = server.communicate(timeout=60)
+    assert errors.count("\n") == 1, errors
+    assert "broken/manifest.json" in errors
 
 
 def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:
