@@ -27,8 +27,7 @@ export const SIZES = { large: { width: 1280, height: 720 }, small: { width: 1024
 /** One participant at one computer. */
 export class Participant {
   /** @type {string[]} */ errors = [];
-  /** Decisions that the page sent, by round and seq; the same one may be sent more than once. @type {Map<string, string>} */ sent =
-    new Map();
+  /** Decisions that the server confirmed, by round and seq. @type {Map<string, string>} */ sent = new Map();
   shots = 0;
   #looking = false;
 
@@ -83,9 +82,9 @@ export class Participant {
       if (this.#looking) return; // taking a picture and checking it put styles into the page, which the policy refuses
       if (message.type() === "error" && !/Failed to load resource|net::ERR/.test(text)) this.errors.push(text);
     });
-    page.on("request", (request) => {
-      if (!request.url().endsWith("/step")) return;
-      const body = request.postData() ?? "";
+    page.on("response", (response) => {
+      if (!response.url().endsWith("/step") || response.status() !== 200) return;
+      const body = response.request().postData() ?? "";
       const { round, seq } = JSON.parse(body);
       this.sent.set(`${round}:${seq}`, body);
     });

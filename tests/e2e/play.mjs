@@ -4,6 +4,7 @@
 
 import assert from "node:assert/strict";
 import { randomBytes } from "node:crypto";
+import { serve } from "../static/serve.mjs";
 import { Participant, playing, press, result, SIZES, steps, strip } from "./browser.mjs";
 
 /** @import { Page } from "playwright-core" */
@@ -62,6 +63,12 @@ async function instructions(who, page, what, keys) {
   await page.getByRole("button", { name: "Next" }).click();
   await page.locator(".board-wrap svg").waitFor();
 }
+
+const EXAMPLES = {
+  parent: [...Array(6).fill("ArrowLeft"), ...Array(3).fill("ArrowUp")],
+  child: ["9"],
+  driver: ["f", ...Array(15).fill("j")],
+};
 
 const ARROWS = ["ArrowUp", "ArrowLeft", "ArrowUp", "ArrowRight", "ArrowRight", "ArrowDown"];
 
@@ -311,6 +318,56 @@ async function lostAnswer(base) {
   });
 }
 
+/**
+ * Somebody else took the next step (a tab that this one knows nothing of): the server's view is adopted, and it is said.
+ * @param {Participant} who
+ * @param {Page} page
+ */
+async function movedOn(who, page) {
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  const mine = [...who.sent.values()].map((body) => JSON.parse(body)).at(-1);
+  const status = await page.evaluate(
+    async (step) => {
+      const { step_url } = JSON.parse(document.querySelector("#page-data")?.textContent ?? "{}");
+      const headers = { "content-type": "application/json" };
+      return (await fetch(step_url, { method: "POST", headers, body: JSON.stringify(step) })).status;
+    },
+    { ...mine, seq: mine.seq + 1, action: 1, timing: { ...mine.timing, hidden: false } },
+  );
+  assert.equal(status, 200);
+  await page.keyboard.press("j");
+  await page.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("went on elsewhere"));
+  assert.equal(await steps(page), 3, "one step was made, not two");
+  await who.look(page, "moved-on");
+  await press(page, "j");
+  assert.equal(await steps(page), 4);
+}
+
+/** The example page: both plugins in an experiment that knows no hatlab server. */
+async function example() {
+  const { url, close } = await serve();
+  return as("example", async (who) => {
+    const page = await who.tab();
+    for (const [role, keys] of Object.entries(EXAMPLES)) {
+      await page.goto(`${url}/example/?role=${role}`);
+      for (const key of keys) {
+        await page.locator(".key[aria-disabled=false]").first().waitFor();
+        await page.keyboard.press(key);
+        await page.waitForTimeout(80);
+      }
+      await page.locator(".strip .button-primary").waitFor();
+      await who.look(page, role);
+      await page.keyboard.press("Space");
+      await page.waitForFunction(() => "last" in globalThis);
+      const data = await page.evaluate(() => /** @type {any} */ (globalThis).last);
+      assert.match(data.outcome, /found|arrived/);
+      assert.equal(data.decisions.length, keys.length);
+      assert.ok(data.decisions.every((/** @type {any} */ { timing }) => timing.is_trusted && timing.rt_ms > 0));
+    }
+    close();
+  });
+}
+
 /** @param {string} base */
 async function smallWindow(base) {
   return as("small-window", async (who) => {
@@ -328,11 +385,19 @@ async function smallWindow(base) {
     assert.equal(await steps(page), 1, "a covered board takes no keys");
     await press(page, "j");
     assert.equal(await steps(page), 2);
+    await movedOn(who, page);
   });
 }
 
 /** @type {Record<string, (server: string) => Promise<Participant>>} */
-const SCENARIOS = { parent_child: parentChild, traffic, decline, lost_answer: lostAnswer, small_window: smallWindow };
+const SCENARIOS = {
+  parent_child: parentChild,
+  traffic,
+  decline,
+  lost_answer: lostAnswer,
+  small_window: smallWindow,
+  example,
+};
 
 const visit = SCENARIOS[scenario];
 assert.ok(visit, `no scenario ${scenario}; there are ${Object.keys(SCENARIOS).join(", ")}`);

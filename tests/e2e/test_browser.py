@@ -93,6 +93,11 @@ def judge(scenario: str, steps: list[dict[str, Any]]) -> None:
         assert resumed == 2, "after the lost answers and after the reload"
     if scenario == "small_window":
         assert hidden == 1, "the step after the board was covered"
+        assert resumed == 1, "the step after the view was adopted"
+
+
+def test_the_plugins_work_without_a_server(lab: Laboratory) -> None:
+    assert play(lab, "example") == []
 
 
 def test_declining_previewing_and_unknown_links_have_pages_and_leave_nothing(lab: Laboratory) -> None:

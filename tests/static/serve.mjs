@@ -7,14 +7,19 @@ import { extname, join, normalize } from "node:path";
 import { fileURLToPath } from "node:url";
 
 const ROOT = fileURLToPath(new URL("../..", import.meta.url));
-const FOLDERS = { static: join(ROOT, "static"), example: join(ROOT, "tests/static/example") };
+/** @type {Record<string, string>} */
+const FOLDERS = {
+  static: join(ROOT, "static"),
+  example: join(ROOT, "tests/static/example"),
+  benchmarks: join(ROOT, "benchmarks/browser"),
+};
 /** @type {Record<string, string>} */
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/json" };
 
 /** @param {string} path of the request */
 function fileFor(path) {
   const [, folder = "", ...rest] = normalize(decodeURIComponent(path)).split("/");
-  const base = FOLDERS[/** @type {keyof typeof FOLDERS} */ (folder)];
+  const base = FOLDERS[folder];
   if (!base) return null;
   const file = join(base, rest.join("/") || "index.html");
   return existsSync(file) && statSync(file).isFile() ? file : null;

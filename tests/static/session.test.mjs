@@ -106,11 +106,11 @@ test("a left-behind action that came too late is thrown away", async () => {
 });
 
 test("a stale decision adopts the view that the server returns, and says so", async () => {
-  const { session, said } = page([{ status: 409, body: { view: parentView({ seq: 9 }) } }]);
+  const { session } = page([{ status: 409, body: { view: parentView({ seq: 9 }) } }]);
   const next = await session.decide(parentView({ seq: 5 }), 2, TIMING);
   assert.equal(next?.seq, 9);
   assert.equal(next?.resumed, true);
-  assert.equal(said[0].title, "Carried on");
+  assert.equal(next?.notice?.title, "Carried on");
 });
 
 test("a lost connection flags the next decision, and nothing is lost", async () => {
@@ -122,12 +122,21 @@ test("a lost connection flags the next decision, and nothing is lost", async () 
   assert.equal((await calm.decide(parentView({ seq: 6 }), 2, TIMING))?.resumed, false);
 });
 
-test("another page, a closed session and an unknown one are left for", async () => {
-  const elsewhere = page([{ status: 200, body: { page: "/p/k" } }]);
-  assert.equal(await elsewhere.session.open(7), null);
-  const gone = page([{ status: 404, body: { title: "unknown" } }]);
-  assert.equal(await gone.session.open(null), null);
-  assert.deepEqual([...elsewhere.left, ...gone.left], ["/p/k", "/p/k"]);
+test("a page that the server names is gone to", async () => {
+  const { session, left } = page([{ status: 200, body: { page: "/p/k" } }]);
+  assert.equal(await session.open(7), null);
+  assert.deepEqual(left, ["/p/k"]);
+});
+
+test("what is neither view nor page is said, and never leads into a loop of reloads", async () => {
+  for (const status of [403, 404, 410, 413, 422]) {
+    const { session, said, left } = page([{ status, body: { title: "no" } }]);
+    assert.equal(await session.open(null), null);
+    assert.equal(said[0].title, "Something went wrong");
+    assert.deepEqual(left, []);
+    said[0].button.press();
+    assert.deepEqual(left, ["/p/k"]);
+  }
 });
 
 test("a refused decision is said, and never sent again", async () => {

@@ -6,7 +6,7 @@ import { browserClock } from "./clock.js";
 import { el } from "./dom.js";
 import { Responder } from "./responder.js";
 import { confirmation, newStrip, sayIn } from "./strip.js";
-import { onward, result } from "./words.js";
+import { onward, prompt, result } from "./words.js";
 
 /** @import { Brought, Decide, Message, RoundView } from "./types.js" */
 /** @import { KeyName } from "./keys.js" */
@@ -107,13 +107,21 @@ export class Round {
   }
 
   /**
+   * What the strip says while the view is on screen.
+   * @param {RoundView & Brought} view
+   */
+  tell(view) {
+    this.say(view.over ? result(view) : (view.notice ?? prompt(view)));
+  }
+
+  /**
    * Says how it ended and waits for Space or a click.
    * @param {RoundView | null} view
    */
   async finish(view) {
     this.responder.close();
     if (!view) return;
-    await confirmation(this.say, result(view), onward(view));
+    await confirmation(this.say, result(view), onward(view), this.attention);
     await this.parameters.proceed?.(view);
   }
 

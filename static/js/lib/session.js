@@ -60,8 +60,8 @@ export class Session {
     const answer = await this.#post(this.seams.urls.step, step);
     this.seams.outbox.clear();
     const next = this.#viewOf(answer);
-    if (next && answer.status === 409) this.seams.say(NOTICES.moved_on);
-    return next && this.#brought(next, answer.status === 409);
+    if (!next || answer.status === 200) return next && this.#brought(next, false);
+    return { ...this.#brought(next, true), notice: NOTICES.moved_on };
   }
 
   /** @param {RoundView} view The picture is on screen: a reload from here on is a second look. */
@@ -115,8 +115,8 @@ export class Session {
   #viewOf({ status, body }) {
     const view = status === 409 ? body?.view : body;
     if ((status === 200 || status === 409) && view?.role) return view;
-    if (status === 422) this.#refuse();
-    else this.seams.leave(body?.page ?? this.seams.urls.page);
+    if (status === 200 && body?.page) this.seams.leave(body.page);
+    else this.#refuse();
     return null;
   }
 

@@ -52,24 +52,24 @@ function pressable({ label, key, primary, press }) {
  * @param {(message: Message) => void} say
  * @param {Message} message
  * @param {string} label
- * @param {EventTarget} [page]
+ * @param {{ held: boolean }} attention while it is held Space does nothing
  * @returns {Promise<void>}
  */
-export function confirmation(say, message, label, page = document) {
+export function confirmation(say, message, label, attention) {
   return new Promise((resolve) => {
     const go = () => {
-      page.removeEventListener("keydown", onKey);
+      document.removeEventListener("keydown", onKey);
       // The key that was clicked last must not be pressed again when Space comes up.
       if (document.activeElement instanceof HTMLElement) document.activeElement.blur();
       resolve();
     };
     const onKey = (/** @type {Event} */ event) => {
       const key = /** @type {KeyboardEvent} */ (event);
-      if (key.key !== " ") return;
+      if (key.key !== " " || attention.held) return;
       key.preventDefault();
       if (!key.repeat) go();
     };
-    page.addEventListener("keydown", onKey);
+    document.addEventListener("keydown", onKey);
     say({ ...message, button: { label, key: "Space", primary: true, press: go } });
   });
 }

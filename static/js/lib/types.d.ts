@@ -80,6 +80,8 @@ export type RoundView = ParentView | ChildView | DriverView;
 export interface Brought {
   /** The wait was no ordinary one (reload, lost connection, another tab): the next time is flagged. */
   resumed?: boolean;
+  /** Said instead of the prompt, once. */
+  notice?: Message;
 }
 
 export interface Timing {

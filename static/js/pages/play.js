@@ -26,10 +26,12 @@ const transport = new Transport();
 const storage = pageStorage();
 
 /** @type {Message} */ let spoken = {};
+/** A newer tab has the game: nothing but that is said here. */
+let elsewhere = false;
 const write = sayIn(strip);
 const say = (/** @type {Message} */ message) => {
   spoken = message;
-  write(message);
+  if (!elsewhere) write(message);
 };
 
 const session = new Session({
@@ -53,6 +55,7 @@ function head({ phase, number, of }) {
 
 /** Connection lost: the board dims, the keys are flat, the strip counts down to the next try. */
 transport.addEventListener("lost", (event) => {
+  if (elsewhere) return;
   const { delay_ms } = /** @type {CustomEvent} */ (event).detail;
   document.body.classList.add("paused");
   const press = () => transport.hurry();
@@ -62,6 +65,7 @@ transport.addEventListener("lost", (event) => {
 
 transport.addEventListener("found", () => {
   countDown(0);
+  if (elsewhere) return;
   document.body.classList.remove("paused");
   write(spoken);
 });
@@ -83,8 +87,9 @@ function trying(left_ms) {
   return left_ms < 500 ? "trying again" : `trying again in ${Math.round(left_ms / 1000) || 1} s`;
 }
 
-/** A newer tab has the game: this one stops until the person says otherwise. */
+/** This tab stops until the person says otherwise. */
 const announce = takeTurn(openChannel(urls.page_url), () => {
+  elsewhere = true;
   attention.hold("elsewhere");
   document.body.classList.add("paused");
   const press = () => {

@@ -11,7 +11,7 @@ import { badge, plane } from "../board/tokens.js";
 import { el } from "../lib/dom.js";
 import { Round } from "../lib/round.js";
 import { keyButton, meterBlock, setKeys } from "../lib/stage.js";
-import { prompt, result, WORDS } from "../lib/words.js";
+import { WORDS } from "../lib/words.js";
 
 /** @import { Brought, ChildView, ParentView } from "../lib/types.js" */
 /** @import { KeyName } from "../lib/keys.js" */
@@ -104,7 +104,7 @@ async function playParent(round, first) {
     meter.set(view.step, view.limit);
     setTalk(view.sign, view, parentTalk(view));
     setKeys(keys, { active: !view.over });
-    round.say(view.over ? result(view) : prompt(view));
+    round.tell(view);
   };
   return round.play(first, {
     draw,
@@ -143,7 +143,7 @@ async function playChild(round, first, pace_ms) {
     setTalk(null, view, `${view.signs.length} ${view.blank ? "blank signs" : "messages"} to choose from`);
     hint.textContent = WORDS.sent_at_once;
     setKeys(keys, { active: true });
-    round.say(prompt(view));
+    round.tell(view);
   };
   const byDigit = Object.fromEntries(numbers.map((number) => [`digit-${number}`, number]));
   const last = await round.play(first, {

@@ -11,7 +11,6 @@ import { CAUTION, portrait } from "../board/symbols.js";
 import { el } from "../lib/dom.js";
 import { Round } from "../lib/round.js";
 import { keyButton, meterBlock, setKeys } from "../lib/stage.js";
-import { prompt, result } from "../lib/words.js";
 
 /** @import { Brought, DriverView, Roads } from "../lib/types.js" */
 /** @import { RoundParameters } from "../lib/round.js" */
@@ -95,7 +94,7 @@ async function drive(round, first) {
     steps.set(view.step, view.limit);
     route.set(view.position, view.route.length);
     setKeys(keys, { active: !view.over });
-    round.say(view.over ? result(view) : prompt(view));
+    round.tell(view);
   };
   return round.play(first, {
     draw,
