@@ -33,8 +33,8 @@ class Settings(BaseSettings):
     """Addresses of proxies (commas between) whose X-Forwarded-… headers are believed; empty: nobody's."""
     trial_cache: int = Field(default=256, ge=0)
     """Folded trials kept in memory by each worker; 0 turns the cache off. Never changes an answer."""
-    body_max_bytes: int = Field(default=65_536, ge=1_024)
-    """Largest request body that is read."""
+    body_max_bytes: int = Field(default=262_144, ge=1_024)
+    """Largest request body that is read; room for a long consent text in any script, percent-encoded."""
 
     @field_validator("public_url")
     @classmethod

@@ -96,6 +96,15 @@ def test_a_time_that_is_no_number_is_refused(client: Client, address: str, numbe
     assert client.post(f"{address}/step", content=text, headers=headers).status_code == 422
 
 
+@pytest.mark.parametrize("text", ["[" * 200_000, "1" * 100_000, "\udcff", '{"after":' + "9" * 5_000 + "}"])
+def test_a_body_made_to_hurt_the_parser_is_refused(client: Client, address: str, text: str) -> None:
+    content = text.encode("utf-8", "surrogateescape")
+    headers = {"content-type": "application/json"}
+    response = client.post(f"{address}/round", content=content, headers=headers)
+    assert response.status_code in {400, 422}
+    assert response.headers["content-type"] == "application/problem+json"
+
+
 def test_a_round_that_was_not_opened_is_not_found(client: Client, address: str) -> None:
     response = client.post(f"{address}/step", json=spoilt(round=9))
     assert response.status_code == 404
@@ -117,6 +126,6 @@ def test_scripts_on_the_wrong_page_are_sent_to_the_right_one(lab: Lab, client: C
 
 
 def test_a_body_over_the_limit_is_a_problem(client: Client, address: str) -> None:
-    response = client.post(f"{address}/step", content=b" " * 70_000)
+    response = client.post(f"{address}/step", content=b" " * 300_000)
     assert response.status_code == 413
     assert response.headers["content-type"] == "application/problem+json"
