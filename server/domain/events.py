@@ -8,7 +8,7 @@ that the digest covers it.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from models.vocabulary import SILENT
@@ -51,6 +51,9 @@ class Saw:
     sign: int | None
     """The number that was highlighted."""
 
+    def to_dict(self) -> Body:
+        return {name: getattr(self, name) for name in self.__slots__}
+
 
 def silence(agents: int) -> Said:
     return Said((SILENT,) * agents, (False,) * agents)
@@ -62,7 +65,7 @@ def start_body(spec: TrialSpec, said: Said, saw: Saw, stored_utc: str) -> Body:
         "spec": spec.model_dump(mode="json"),
         "tokens": list(said.tokens),
         "gates": list(said.gates),
-        "saw": asdict(saw),
+        "saw": saw.to_dict(),
         "stored_utc": stored_utc,
     }
 
@@ -84,7 +87,7 @@ def decision_body(
             {"actions": list(m.actions), "tokens": list(m.said.tokens), "gates": list(m.said.gates)}
             for m in moves
         ],
-        "saw": asdict(saw),
+        "saw": saw.to_dict(),
         "stored_utc": stored_utc,
     }
 

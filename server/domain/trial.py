@@ -56,7 +56,7 @@ class Trial:
     def route(self) -> tuple[int, ...]:
         """Driver: the cells of the own route."""
         assert isinstance(self.env, TrafficJunction)
-        return tuple(int(cell) for cell in self.env.routes[self.route_id])
+        return self.env.routes[self.route_id]
 
     def can(self, action: int) -> bool:
         """Whether the participant may choose this now."""
@@ -139,9 +139,10 @@ def driven(trial: Trial) -> Trial:
     assert isinstance(env, TrafficJunction)
     if env.completed(world)[0, seat]:
         return replace(trial, progress=int(env.route_length[trial.route_id]), outcome="arrived")
-    cell = int(env.cell_of(world)[0, seat])
+    progress = int(world.position[0, seat])
+    cell = env.routes[trial.route_id][progress]
     outcome = None
-    if env.collided(world)[0, seat]:
+    if world.collided_ever[0, seat]:  # the first collision ends the trial
         outcome = "collision"
     elif trial.step >= trial.spec.condition.step_limit:
         outcome = "limit"
@@ -149,7 +150,7 @@ def driven(trial: Trial) -> Trial:
         trial,
         cell=cell,
         trail=(*trial.trail, cell),
-        progress=int(world.position[0, seat]),
+        progress=progress,
         outcome=outcome,
     )
 

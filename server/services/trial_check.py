@@ -7,7 +7,7 @@ agents decided) is held by the digests and must be legal.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from models.policies.lexicon import Lexicon
@@ -96,7 +96,7 @@ def replayed(lab: Lab, spec: TrialSpec, stored: Sequence[EventRow], bodies: Sequ
         except (CorruptError, KeyError, TypeError, IndexError, AttributeError, ValueError) as error:
             raise DifferenceError(f"seq {seq}: {said_of(error)}") from error
         seen = saw(at, translate(at, lexicon))
-        again = rebuilt(body, event, asdict(seen), spec if seq == 0 else None)
+        again = rebuilt(body, event, seen.to_dict(), spec if seq == 0 else None)
         for found in differences(body, again):
             raise DifferenceError(f"seq {seq}: {found}")
         digest = events.digest(digest, event.body)
