@@ -8,6 +8,7 @@ password is hashed.
 import hashlib
 import math
 import secrets
+import threading
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from functools import cache
@@ -30,6 +31,8 @@ KEPT = timedelta(days=30)
 # Failed attempts in the window: a person mistypes; a source may hold several people; a username may be
 # guessed from many sources, where a low limit would let strangers lock its owner out.
 PAIR_MAX, SOURCE_MAX, USERNAME_MAX_FAILURES = 5, 20, 50
+
+HASHING = threading.BoundedSemaphore(2)  # a hash takes 64 MiB: guesses at once must not take all memory
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +113,8 @@ def new_hash(password: str) -> str:
 
 def matches(password_hash: str, password: str) -> bool:
     try:
-        return hasher().verify(password_hash, password)
+        with HASHING:
+            return hasher().verify(password_hash, password)
     except (VerificationError, InvalidHashError):
         return False
 

@@ -9,7 +9,11 @@ setInterval(() => {
 }, EVERY_MS);
 
 async function refresh() {
-  const response = await fetch(location.href, { headers: { accept: "text/html" }, redirect: "error" });
+  const response = await fetch(location.href, { headers: { accept: "text/html" }, redirect: "manual" });
+  if (response.type === "opaqueredirect") {
+    say("Signed out: reload to sign in");
+    return;
+  }
   if (!response.ok) throw new Error(String(response.status));
   const page = new DOMParser().parseFromString(await response.text(), "text/html");
   const now = document.querySelector("[data-live]");
