@@ -106,15 +106,24 @@ async def _reach(crowd: Crowd) -> None:
 
 
 async def play(
-    crowd: Crowd, sign: Callable[[], str], on_done: Callable[[Result], None] | None = None
+    crowd: Crowd,
+    sign: Callable[[], str],
+    on_done: Callable[[Result], None] | None = None,
+    journals: list[Result] | None = None,
 ) -> list[Result]:
-    """Run the robots without asking first whether the server is there."""
+    """Run the robots without asking first whether the server is there.
+
+    Each robot's result is put into `journals` as it begins, and grows there while it plays.
+    """
     places = asyncio.Semaphore(crowd.concurrency)
     context = ssl.create_default_context()
 
     async def one(index: int) -> Result:
         async with places, Browser(crowd.url, context, sign(), USER_AGENT) as browser:
-            result = await robot(crowd, index, browser).walk()
+            walker = robot(crowd, index, browser)
+            if journals is not None:
+                journals.append(walker.result)
+            result = await walker.walk()
         if on_done is not None:
             on_done(result)
         return result

@@ -39,6 +39,8 @@ class Result:
     steps: list[Step] = field(default_factory=list)
     latencies_ms: list[float] = field(default_factory=list)
     retries: int = 0
+    stale: int = 0
+    """Steps that the server refused because another decision was there; never, with one robot a session."""
     key: str = ""
 
 
@@ -117,6 +119,7 @@ class Robot:
         response = await self.browser.post_json(step_url, body)
         self.result.latencies_ms.append((time.perf_counter() - began) * 1000)
         if response.status_code == CONFLICT:
+            self.result.stale += 1
             stale: View = response.json()["view"]
             return stale
         answer = json_of(response)
