@@ -18,7 +18,8 @@ PRACTICE_STEPS = 4
 @pytest.fixture(name="lab")
 def quick_lab(sqlite_database: Database) -> Lab:
     lab = fake_lab(sqlite_database)
-    launch(lab, definition(SLUG))
+    for slug in (SLUG, "parent-child"):
+        launch(lab, definition(slug))
     return lab
 
 
@@ -44,3 +45,17 @@ def test_instructions_page_and_practice_are_the_same_bytes_in_every_arm(lab: Lab
     assert len(sent) == 3
     first, *others = sent.values()
     assert all(other == first for other in others)
+
+
+def test_pages_of_parent_and_child_differ_by_role_and_by_nothing_else(lab: Lab) -> None:
+    client = client_of(lab)
+    pages: dict[tuple[str, str], list[str]] = {}
+    for index in range(16):
+        address = come_in(client, "parent-child", prolific(f"p{index}"))
+        key = address.removeprefix("/p/")
+        who = person(lab, key)
+        sent = [client.get(address).text.replace(key, "KEY"), go_on(client, address).text.replace(key, "KEY")]
+        assert pages.setdefault((who.arm, who.role_order), sent) == sent
+    assert {arm for arm, _ in pages} == {"prototype", "one-hot"}
+    for order in ("parent-child", "child-parent"):
+        assert pages["prototype", order] == pages["one-hot", order]
