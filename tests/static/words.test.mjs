@@ -50,6 +50,16 @@ test("practice says at once that it does not count", () => {
   }
 });
 
+test("the end of practice says that rounds count from now on", () => {
+  const practice = { phase: /** @type {const} */ ("practice"), number: 1, of: 1 };
+  assert.match(String(result(parentView({ ...practice, over: over("found") })).text), /^That was practice/);
+  assert.match(
+    String(result(driverView({ ...practice, over: over("arrived") })).text),
+    /another car. That was practice/,
+  );
+  assert.equal(result(parentView({ ...practice, of: 2, over: over("found") })).text, undefined);
+});
+
 test("main rounds carry no guide", () => {
   for (const view of [parentView(), childView(), driverView()]) assert.equal(prompt(view).title, undefined);
 });

@@ -20,7 +20,7 @@ import { keyName } from "./keys.js";
 
 export class Responder {
   #watch = new Stopwatch();
-  #frames = new FrameMeter();
+  #frames;
   /** @type {Question | null} */ #question = null;
   /** @type {((decision: Decision) => void) | null} */ #resolve = null;
   /** @type {Partial<Record<KeyName, number>>} */ #keys = {};
@@ -28,13 +28,15 @@ export class Responder {
   #shows = 0;
 
   /**
-   * @param {{ clock: Clock, attention: Attention, page: EventTarget, boardPx: () => number }} seams
+   * @param {{ clock: Clock, attention: Attention, page: EventTarget, boardPx: () => number, frames?: FrameMeter }} seams
+   *   frames: one for the page, so that a new round knows the refresh rate at once
    */
-  constructor({ clock, attention, page, boardPx }) {
+  constructor({ clock, attention, page, boardPx, frames = new FrameMeter() }) {
     this.clock = clock;
     this.attention = attention;
     this.page = page;
     this.boardPx = boardPx;
+    this.#frames = frames;
     this.page.addEventListener("keydown", this.#onKey);
     this.attention.addEventListener("hold", this.#onHold);
     this.attention.addEventListener("release", this.#onRelease);
@@ -44,6 +46,7 @@ export class Responder {
   /** The round is over for this page: nothing is listened to any more. */
   close() {
     this.#counting = false;
+    this.#frames.pause();
     this.#question = null;
     this.page.removeEventListener("keydown", this.#onKey);
     this.attention.removeEventListener("hold", this.#onHold);

@@ -2,7 +2,7 @@
 // What the two plugins share: the stage with its board, the loop of show → decide → show, and the end of a round.
 
 import { Attention } from "./attention.js";
-import { browserClock } from "./clock.js";
+import { browserClock, FrameMeter } from "./clock.js";
 import { el } from "./dom.js";
 import { Responder } from "./responder.js";
 import { confirmation, newStrip, sayIn } from "./strip.js";
@@ -31,6 +31,9 @@ import { onward, prompt, result } from "./words.js";
  * @property {(action: number) => void} taken a decision was made: keys go flat, nothing else changes
  */
 
+/** There is one display, whatever the number of rounds. */
+const display_frames = new FrameMeter();
+
 export class Round {
   /** @type {Decision[]} */ decisions = [];
   #board = el("div", { class: "board-wrap" });
@@ -50,6 +53,7 @@ export class Round {
       clock: browserClock,
       attention: this.attention,
       page: document,
+      frames: display_frames,
       boardPx: () => Math.round(this.#board.getBoundingClientRect().width),
     });
   }

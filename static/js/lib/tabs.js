@@ -5,10 +5,14 @@
 
 /**
  * @param {string} name of the session
- * @returns {Channel | null} null in browsers without BroadcastChannel; the server's 409 still settles who goes on
+ * @returns {Channel | null} null where there is none (old browsers, sandboxed frames); the server's 409 still decides
  */
 export function openChannel(name) {
-  return typeof BroadcastChannel === "undefined" ? null : new BroadcastChannel(`hatlab:${name}`);
+  try {
+    return new BroadcastChannel(`hatlab:${name}`);
+  } catch {
+    return null;
+  }
 }
 
 /**

@@ -97,6 +97,13 @@ function coachDriver(view) {
  * @returns {Message}
  */
 export function result(view) {
+  const said = mainResult(view);
+  if (view.phase === "main" || view.number < view.of) return said;
+  return { ...said, text: [said.text, "That was practice. From now on rounds count."].filter(Boolean).join(" ") };
+}
+
+/** @param {RoundView} view */
+function mainResult(view) {
   if (view.role === "parent") return parentResult(view);
   if (view.role === "child") return childResult(view);
   return driverResult(view);
