@@ -2,8 +2,8 @@
 
 import pytest
 
-from server.storage.database import Database
-from tests.fakes import definition, fake_lab
+from server.services.lab import Lab
+from tests.fakes import definition
 from tests.server.services.steps import launch
 from tests.server.web.client import Client
 from tests.server.web.walk import (
@@ -23,8 +23,7 @@ STUDIES = ["parent-child", "traffic-junction"]
 
 
 @pytest.fixture(name="client")
-def client_of_both_studies(sqlite_database: Database) -> Client:
-    lab = fake_lab(sqlite_database)
+def client_of_both_studies(lab: Lab) -> Client:
     for slug in STUDIES:
         launch(lab, definition(slug, trials_per_block=2))
     return client_of(lab)
