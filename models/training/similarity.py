@@ -1,8 +1,9 @@
 """Information similarity: can the world be read off what was heard? An auxiliary loss, in training only.
 
 Traffic Junction: occupancy of every road cell by the other cars now, and the cells that they would enter with
-gas (their intent). Parent & Lost Child: the cell of the speaker, or its row and column. Shapes: M rows, C
-road cells, D message.
+gas (their intent). Parent & Lost Child: the cell of the speaker, or its row and column; where messages are
+vectors, row and column are read from the message and the message is predicted from row and column, so that
+near places get near messages. Shapes: M rows, C road cells, D message.
 
 Source: Karten et al. 2023, information similarity; intent after the paper's section on Traffic Junction.
 """
@@ -19,15 +20,20 @@ from models.training.config import Decoder
 from models.training.imitation import intent
 from models.training.unroll import Unrolled
 
+TOPOGRAPHY = 0.1  # weight of predicting the message: messages begin with variance 4, places with 0.2
 RARE = -2.5  # first logit of a cell being occupied: about 1 in 12, as on medium
 
 
 class Reader(nn.Module):
     """Predicts the target from the inbox, or from [second hidden, inbox]."""
 
-    def __init__(self, env: Environment[Any], settings: Decoder, hidden: int, message: int) -> None:
+    def __init__(
+        self, env: Environment[Any], settings: Decoder, hidden: int, message: int, *, vectors: bool
+    ) -> None:
         super().__init__()
         self.settings = settings
+        two_ways = settings.target == "coordinates" and settings.reads == "inbox" and vectors
+        self.write = nn.Linear(2, message) if two_ways else None
         size = target_size(env, settings)
         if settings.reads == "inbox":
             self.read: nn.Module = nn.Linear(message, size)
@@ -66,7 +72,10 @@ def similarity_loss(env: Environment[Any], reader: Reader, seen: Unrolled) -> Te
         return nn.functional.cross_entropy(read, cell)
     height, width = env.shape
     place = torch.stack((cell // width / (height - 1), cell % width / (width - 1)), 1)
-    return torch.mean((read - place).square().sum(1))
+    loss = (read - place).square().sum(1).mean()
+    if reader.write is not None:
+        loss = loss + TOPOGRAPHY * (reader.write(place) - seen.inbox[rows]).square().sum(1).mean()
+    return torch.as_tensor(loss)
 
 
 def occupancy(env: TrafficJunction, seen: Unrolled) -> np.ndarray[Any, np.dtype[np.float32]]:
