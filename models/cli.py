@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import sys
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -19,6 +20,8 @@ from models.envs import registry
 from models.policies import bundle, scripted
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from models.envs.api import Environment
     from models.evaluate import Measure
     from models.interpret.summary import Meaning
@@ -27,6 +30,7 @@ if TYPE_CHECKING:
 PACKAGE = Path(__file__).parent
 BUNDLES, RECIPES = PACKAGE / "bundles", PACKAGE / "recipes"
 BROKEN, BAD_INPUT = 1, 2
+TABLE_WIDTH = 140
 
 
 class Start(StrEnum):
@@ -195,7 +199,6 @@ def release(
 @app.command("bundles")
 def list_bundles(bundles: BundlesOption = BUNDLES) -> None:
     """List and verify all bundles; exit 1 if any is broken."""
-    from rich.console import Console
     from rich.table import Table
 
     if not bundles.is_dir():
@@ -214,7 +217,7 @@ def list_bundles(bundles: BundlesOption = BUNDLES) -> None:
             held.sha256[:12],
         )
         table.add_row(*map(str, row))
-    Console().print(table)
+    _print_table(table)
     for line in errors:
         typer.echo(line, err=True)
     raise typer.Exit(BROKEN if errors else 0)
@@ -286,7 +289,6 @@ def _write_json(path: Path, data: dict[str, Any]) -> None:
 
 
 def _print_measures(asked: dict[str, Any], measures: dict[str, Measure]) -> None:
-    from rich.console import Console
     from rich.table import Table
 
     said = [f"{key} {value}" for key, value in asked.items() if value is not None and value is not False]
@@ -295,7 +297,15 @@ def _print_measures(asked: dict[str, Any], measures: dict[str, Measure]) -> None
     for name, measure in measures.items():
         low, high = measure.ci95
         table.add_row(name, f"{measure.mean:.4f}", f"{low:.4f}", f"{high:.4f}")
-    Console().print(table)
+    _print_table(table)
+
+
+def _print_table(table: Table) -> None:
+    """Print at full width where nobody's window sets one, so that names can be searched for."""
+    from rich.console import Console
+
+    width = None if sys.stdout.isatty() else TABLE_WIDTH
+    Console(width=width).print(table)
 
 
 def _print_meaning(held: PolicyBundle, meaning: Meaning, numbers: dict[str, Any]) -> None:
