@@ -14,10 +14,10 @@ DEV := $(VENV)/.dev
 NODE := node_modules/.installed
 # Node 20 or newer, or nothing.
 HAVE_NODE := $(shell node -e 'process.exit(Number(process.versions.node.split(".")[0]) >= 20 ? 0 : 1)' 2>/dev/null && echo yes)
-RECIPE ?= models/recipes/parent-child-prototype-9.toml
+RECIPE ?= models/recipes/parent-prototype-9.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check format bench train learn torture docs clean hooks
+.PHONY: help serve test check format bench train learn torture screenshots docs clean hooks
 
 help: ## list every target
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## */  make \1\t/' | expand -t 18
@@ -57,6 +57,9 @@ learn: $(DEV) ## slow tests: do the recipes still learn?
 
 torture: $(DEV) ## kill -9 the server 20 times under 20 robots, on SQLite and on PostgreSQL
 	$(BIN)/python -m tests.torture
+
+screenshots: $(RUNTIME) $(NODE) ## take the pictures of README and docs again (needs Node 20 and Chromium)
+	node tests/e2e/screenshots.mjs docs/images
 
 docs: $(DEV) ## write the generated documents again (data dictionary)
 	$(BIN)/python -m server.services.codebook > docs/data-dictionary.md

@@ -18,7 +18,10 @@ const FOLDER = resolve(process.argv[2] ?? "docs/images");
 const PASSWORD = randomBytes(12).toString("hex");
 const ROBOTS = 4;
 /** Steps after which the pictures of a round are taken: enough for a path, too few for the end. */
-const STEPS = 5;
+const STEPS = 4;
+/** Triangles on a picture of the junction, at least; looked for in so many rounds. */
+const TRIANGLES = 2;
+const ROUNDS = 10;
 
 /**
  * A migrated database and a server of its own, for as long as `use` runs.
@@ -63,7 +66,16 @@ async function picture(page, name) {
 }
 
 /**
- * Through consent and instructions, as far as the board.
+ * The link of somebody new.
+ * @param {string} url
+ * @param {string} study
+ */
+function invitation(url, study) {
+  return `${url}/s/${study}?PROLIFIC_PID=${randomBytes(12).toString("hex")}&STUDY_ID=pictures&SESSION_ID=1`;
+}
+
+/**
+ * Through consent, as far as the instructions.
  * @param {Page} page
  * @param {string} link
  */
@@ -131,43 +143,28 @@ async function asChild(page) {
 }
 
 /**
- * The blocks of Parent & Lost Child, in whichever order they were drawn; the second is reached by playing the first.
+ * People come in until both roles were somebody's first one.
  * @param {Page} page
+ * @param {string} url
  */
-async function bothRoles(page) {
-  for (let block = 0; block < 2; block += 1) {
-    await page.locator("#probe").waitFor();
+async function bothRoles(page, url) {
+  for (const seen = new Set(); seen.size < 2; ) {
+    await enter(page, invitation(url, "parent-child"));
     const role = await readInstructions(page);
-    await (role === "parent" ? asParent(page) : asChild(page));
-    if (block === 0) await finish(page, role);
+    if (!seen.has(role)) await (role === "parent" ? asParent(page) : asChild(page));
+    seen.add(role);
   }
-}
-
-/**
- * The rest of the block, quickly.
- * @param {Page} page
- * @param {string} role
- */
-async function finish(page, role) {
-  for (;;) {
-    await result(page);
-    const last = (await page.locator("#strip .button-primary").textContent()) === "Continue";
-    if (last) break;
-    await onward(page);
-    await playing(page);
-    if (role === "parent") await go(page, TOUR);
-    else await page.keyboard.press("2");
-  }
-  await page.keyboard.press("Space");
 }
 
 /** @param {Page} page */
 async function drive(page) {
   await readInstructions(page);
   await go(page, ["j", "f", "j"]);
-  await onward(page);
-  await go(page, ["j"], STEPS - 1);
-  for (let i = 0; i < STEPS && (await page.locator(".caution").count()) < 3; i += 1) await go(page, ["j"], 1);
+  for (let round = 0, warned = false; round < ROUNDS && !warned; round += 1) {
+    await onward(page);
+    await go(page, ["j"], STEPS);
+    warned = (await playing(page)) && (await page.locator(".board-wrap .caution").count()) >= TRIANGLES;
+  }
   await picture(page, "driver");
   await go(page, ["j"]);
   await picture(page, "driver-over");
@@ -202,11 +199,10 @@ await served(async (url, hatlab) => {
     const page = await who.tab();
     await page.goto(`${url}/s/parent-child`);
     await picture(page, "consent");
-    await enter(page, `${url}/s/traffic-junction`);
+    await enter(page, invitation(url, "traffic-junction"));
     await picture(page, "instructions");
     await drive(page);
-    await enter(page, `${url}/s/parent-child`);
-    await bothRoles(page);
+    await bothRoles(page, url);
     await admin(page, url);
     // Taking a picture puts a style into the page, which its content policy refuses; anything else is a fault.
     who.errors = who.errors.filter((error) => !/Content Security Policy/.test(error));
