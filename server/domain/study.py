@@ -100,6 +100,12 @@ class StudyDefinition(Part):
     def places(self) -> int:
         return sum(arm.places for arm in self.arms)
 
+    @property
+    def agents(self) -> frozenset[str]:
+        """Every bundle that somebody in this study may need."""
+        named = {arm.bundle for arm in self.arms}
+        return frozenset(named | {self.panel_bundle} if self.panel_bundle else named)
+
     @cached_property
     def canonical(self) -> str:
         return canonical.dumps(self.model_dump(mode="json"))

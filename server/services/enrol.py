@@ -228,6 +228,8 @@ def kind_of(db: DbSession, lab: Lab, visit: Visit) -> EntryKind:
         return "closed"
     if visit.arrival.preview:
         return "preview"
+    if not visit.study.agents <= lab.bundles.keys():
+        return "paused"  # whoever was let in now would be stuck in the first round with a missing agent
     counts = counts_of(db, lab, visit)
     places = places_of(visit.study)
     return "consent" if allocation.open_cells(places, visit.study.role_orders, counts) else "full"

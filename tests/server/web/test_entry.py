@@ -1,5 +1,6 @@
 """Every state in which somebody can open an entry link, and what consent leaves behind."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -63,6 +64,15 @@ def test_a_study_that_takes_nobody_says_so_and_stores_nothing(lab: Lab, status: 
     ):
         assert said in response.text
         assert response.status_code == 200
+    assert people(lab) == 0
+
+
+def test_nobody_is_let_into_a_study_whose_agents_are_not_all_there(lab: Lab) -> None:
+    launch(lab, definition(SLUG))
+    agents = {name: agent for name, agent in lab.bundles.items() if name != "traffic_junction/budget-030"}
+    client = client_of(replace(lab, bundles=agents))
+    assert "paused" in client.get(f"/s/{SLUG}", params=prolific()).text
+    assert "paused" in client.post(f"/s/{SLUG}/consent", data={**prolific(), **YES}).text
     assert people(lab) == 0
 
 
