@@ -122,6 +122,11 @@ def study_of(db: DbSession, row: StudyRow) -> Study:
     return Study(row, version, from_json(version.definition) if version else None, canonical.loads(text))
 
 
+def versions(db: DbSession, study: Study) -> list[VersionRow]:
+    """Oldest first."""
+    return studies.versions(db, study.row.id)
+
+
 def held(db: DbSession, slug: str) -> Study:
     """The study, locked until the transaction ends."""
     return study_of(db, studies.hold(db, find(db, slug).row.id))

@@ -7,6 +7,7 @@ from fastapi import APIRouter, Depends
 from fastapi.responses import RedirectResponse
 from starlette.responses import Response
 
+from server.domain.errors import NotFoundError
 from server.domain.study import Offer, Task
 from server.services import studies
 from server.services.lab import Lab
@@ -14,8 +15,8 @@ from server.services.studies import TASKS, Study
 from server.storage.database import DbSession
 from server.web import admin_forms
 from server.web.admin_access import CheckedForm, CurrentVisitor, Visitor, signed_in
-from server.web.admin_frame import entry_links, frame, head
-from server.web.admin_pages import BuildPage, BundleChoice, Form, Step
+from server.web.admin_frame import entry_links, frame, head, minute
+from server.web.admin_pages import BuildPage, BundleChoice, Form, LaunchedVersion, Step
 from server.web.dependencies import CurrentLab
 from server.web.rendering import html
 
@@ -83,10 +84,35 @@ def page(
         steps=steps(values, task),
         places=places(values),
         links=entry_links(lab, study),
+        versions=launched(db, study),
         saved=saved,
         notice=notice,
     )
     return html(built, status)
+
+
+def launched(db: DbSession, study: Study) -> tuple[LaunchedVersion, ...]:
+    """The newest first."""
+    return tuple(
+        LaunchedVersion(
+            each.number,
+            minute(each.launched_utc),
+            each.sha256,
+            f"/admin/studies/{study.row.slug}/versions/{each.number}.json",
+        )
+        for each in reversed(studies.versions(db, study))
+    )
+
+
+@router.get("/admin/studies/{slug}/versions/{number}.json")
+def version_as_launched(lab: CurrentLab, slug: str, number: int) -> Response:
+    """The very bytes that were launched: their sha256 is the version's."""
+    with lab.database.reading() as db:
+        found = {each.number: each for each in studies.versions(db, studies.find(db, slug))}
+    if number not in found:
+        raise NotFoundError(f"there is no version {number} of {slug!r}")
+    headers = {"cache-control": "no-store"}
+    return Response(found[number].definition, media_type="application/json", headers=headers)
 
 
 def world(environment: str) -> str:

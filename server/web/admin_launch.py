@@ -1,4 +1,4 @@
-"""Admin: what changes a study for participants. Launching, closing, going live ask first, each on its page."""
+"""Admin: what changes a study for participants. What cannot be taken back asks first, on a page of its own."""
 
 from collections.abc import Mapping
 

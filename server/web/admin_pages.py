@@ -144,6 +144,16 @@ class EntryLink:
 
 
 @dataclass(frozen=True, slots=True)
+class LaunchedVersion:
+    """A frozen version; what stands at `url` has this sha256."""
+
+    number: int
+    launched: str
+    sha256: str
+    url: str
+
+
+@dataclass(frozen=True, slots=True)
 class BuildPage:
     template: ClassVar[str] = "admin/build.html"
     frame: Frame
@@ -159,6 +169,7 @@ class BuildPage:
     steps: tuple[Step, ...]
     places: str
     links: tuple[EntryLink, ...]
+    versions: tuple[LaunchedVersion, ...]
     saved: bool
     notice: str | None = None
 

@@ -78,7 +78,11 @@ def signed_in(untouched: Lab) -> Experimenter:
 
 
 def url_of(path: str) -> str:
-    return path.replace("{slug}", "parent-child").replace("{folder}/{name}", "parent_child/prototype-9")
+    return (
+        path.replace("{slug}", "parent-child")
+        .replace("{number}", "1")
+        .replace("{folder}/{name}", "parent_child/prototype-9")
+    )
 
 
 @pytest.mark.parametrize(("method", "path"), ROUTES)

@@ -1,5 +1,6 @@
 """Making, changing, launching studies through the pages."""
 
+import hashlib
 import json
 import shutil
 from collections.abc import Iterator
@@ -231,6 +232,23 @@ def test_launching_asks_then_freezes_the_version_and_opens_the_study(
     assert (number, study(person.lab, draft).row.status) == (1, "open")
     assert sha256 == canonical.sha256(definition)
     assert json.loads(definition)["title"] == "Rush hour"
+
+
+def test_every_launched_version_can_be_read_as_it_was_launched(person: Experimenter, draft: str) -> None:
+    person.confirm(draft, "launch")
+    person.save(draft, {"title": "Second"})
+    person.confirm(draft, "launch")
+    page = person.get(f"/admin/studies/{draft}").text
+    for number, definition, sha256 in versions(person.lab, draft):
+        url = f"/admin/studies/{draft}/versions/{number}.json"
+        assert f'href="{url}"' in page
+        assert sha256 in page
+        answer = person.get(url)
+        assert answer.headers["content-type"] == "application/json"
+        assert answer.content == definition.encode()
+        assert hashlib.sha256(answer.content).hexdigest() == sha256
+    assert person.get(f"/admin/studies/{draft}/versions/3.json").status_code == 404
+    assert person.get(f"/admin/studies/{draft}/versions/x.json").status_code == 422
 
 
 def test_changing_a_launched_study_makes_the_next_version_and_leaves_the_first(
