@@ -16,7 +16,7 @@ router = APIRouter()
 def healthz(lab: CurrentLab) -> JSONResponse:
     """200 if people can play; 503 if the database cannot be reached or lacks a migration.
 
-    A bundle that failed to load is named, but no reason to turn people away: studies in need of it are paused.
+    A bundle that failed to load is named, but no reason to turn people away: studies that need it are paused.
     """
     state = database_state(lab)
     body = {**state, "bundles": sorted(lab.bundles), "bundle_errors": list(lab.bundle_errors)}
