@@ -1,4 +1,4 @@
-"""Admin: what changes a study for participants. What cannot be taken back asks first, on a page of its own."""
+"""Admin: what changes a study for participants. What cannot be undone asks first, on a page of its own."""
 
 from collections.abc import Mapping
 
