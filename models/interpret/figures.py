@@ -170,7 +170,9 @@ def distance_scatter(found: Distances) -> Chart:
         .mark_circle(size=18 if many else 48, opacity=0.25 if many else 0.65, color=ACCENT)
         .encode(
             x=_axis("x", "distance between prototypes (units of the message space)"),
-            y=_axis("y", "distance between mean locations (cells)"),
+            y=_axis(
+                "y", "distance between mean locations (cells)", (0, 1.08 * float(found.place.max(initial=1)))
+            ),
         )
     )
     if np.isnan(found.r2):
