@@ -128,7 +128,7 @@ def export(
     from server.services.export import export as write
 
     lab = open_lab()
-    gc.freeze()  # millions of short-lived rows are to come: the libraries need not be searched again and again
+    gc.freeze()  # millions of short-lived rows are to come; the libraries need not be searched each time
     manifest = write(lab, study, mode or (), out, practice=practice)
     for name, facts in manifest["files"].items():
         typer.echo(f"{facts['rows']:>9} rows  {out / name}")
