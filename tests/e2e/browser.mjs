@@ -172,3 +172,11 @@ export async function playing(page) {
   await page.locator(".key[aria-disabled=false], #strip .button-primary").first().waitFor();
   return (await page.locator("#strip .button-primary").count()) === 0;
 }
+
+/**
+ * Two frames have passed: what was to be drawn is on screen, and keys are heard again.
+ * @param {Page} page
+ */
+export async function drawn(page) {
+  await page.evaluate(() => new Promise((resolve) => requestAnimationFrame(() => requestAnimationFrame(resolve))));
+}

@@ -12,12 +12,16 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
+import numpy as np
 
+from models.envs import registry
+from models.policies import bundle
+from models.policies.lexicon import Lexicon
 from server.domain import study
 from server.services import studies
 from server.services.lab import Lab
 from server.settings import Settings
-from tests.models.policies.bundles import tiny_bundle
+from tests.models.policies.bundles import TOKENS, tiny_manifest, tiny_policy
 
 ROOT = Path(__file__).parents[2]
 HATLAB = (str(Path(sys.executable).with_name("hatlab")),)
@@ -56,7 +60,7 @@ def laboratory(folder: Path) -> Iterator[Laboratory]:
     """A migrated database, two short studies, and a server that answers."""
     bundles = folder / "bundles"
     for name, (task, channel) in AGENTS.items():
-        tiny_bundle(bundles, task, name, channel=channel)
+        agent(bundles, task, name, channel)
     port = free_port()
     environment = os.environ | {
         "HATLAB_DATABASE_URL": f"sqlite:///{folder / 'hatlab.sqlite3'}",
@@ -78,6 +82,16 @@ def laboratory(folder: Path) -> Iterator[Laboratory]:
         finally:
             server.terminate()
             server.wait(timeout=20)
+
+
+def agent(root: Path, task: str, name: str, channel: str) -> None:
+    """An untrained agent whose signs stand on an ellipse, so that each of them can be clicked."""
+    made = tiny_policy(task, channel=channel)
+    angles = 2 * np.pi * np.arange(TOKENS) / TOKENS
+    places = 0.5 + 0.35 * np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    counts = np.random.default_rng(1).integers(0, 50, (TOKENS, registry.make(task).cells))
+    lexicon = Lexicon.from_counts(counts, places, (0.6, 0.3), seed=1)
+    bundle.save(root, tiny_manifest(made, task, name), made.weights(), lexicon, {"episodes": 0}, "# tiny\n")
 
 
 def shorten(here: Laboratory) -> None:

@@ -5,7 +5,7 @@
 import assert from "node:assert/strict";
 import { randomBytes } from "node:crypto";
 import { serve } from "../static/serve.mjs";
-import { Participant, playing, press, result, SIZES, steps, strip } from "./browser.mjs";
+import { drawn, Participant, playing, press, result, SIZES, steps, strip } from "./browser.mjs";
 
 /** @import { Page } from "playwright-core" */
 
@@ -214,12 +214,12 @@ async function traffic(base) {
       await drive(page);
       await who.look(page, "driver-round-over");
       await onward(page);
-      const newer = await secondTab(who, page);
-      await drive(newer);
-      await onward(newer);
-      await drive(newer);
-      await newer.keyboard.press("Space");
-      await complete(who, newer);
+      await secondTab(who, page);
+      await drive(page);
+      await onward(page);
+      await drive(page);
+      await page.keyboard.press("Space");
+      await complete(who, page);
     },
     SIZES.small,
   );
@@ -249,7 +249,7 @@ async function offline(who, page) {
 }
 
 /**
- * The same session in a second tab: the first stops and says so.
+ * The same session in a second tab: the first stops and says so, and takes the round back when asked to.
  * @param {Participant} who
  * @param {Page} page
  */
@@ -266,7 +266,12 @@ async function secondTab(who, page) {
   await page.keyboard.press("f");
   await page.waitForTimeout(300);
   assert.equal(await steps(page), before, "the older tab takes no keys");
-  return newer;
+  await press(newer, "f");
+  await page.bringToFront();
+  await page.getByRole("button", { name: "Continue here" }).click();
+  await newer.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("Open in another tab"));
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  assert.equal(await steps(page), await steps(newer), "back in the first tab at the step of the second");
 }
 
 /** @param {string} base */
@@ -343,6 +348,27 @@ async function movedOn(who, page) {
   assert.equal(await steps(page), 4);
 }
 
+/**
+ * The page is hidden for a while, as behind another window.
+ * @param {Page} page
+ */
+async function hide(page) {
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  const show = (/** @type {string} */ state) =>
+    page.evaluate((value) => {
+      Object.defineProperty(document, "visibilityState", { value, configurable: true });
+      document.dispatchEvent(new Event("visibilitychange"));
+    }, state);
+  const before = await steps(page);
+  await show("hidden");
+  await page.keyboard.press("j");
+  await page.waitForTimeout(200);
+  assert.equal(await steps(page), before, "nobody sees the board");
+  await show("visible");
+  await drawn(page);
+  await press(page, "j");
+}
+
 /** The example page: both plugins in an experiment that knows no hatlab server. */
 async function example() {
   const { url, close } = await serve();
@@ -383,9 +409,11 @@ async function smallWindow(base) {
     await page.setViewportSize(SIZES.small);
     await page.locator("#cover").waitFor({ state: "hidden" });
     assert.equal(await steps(page), 1, "a covered board takes no keys");
+    await drawn(page);
     await press(page, "j");
     assert.equal(await steps(page), 2);
     await movedOn(who, page);
+    await hide(page);
   });
 }
 

@@ -87,12 +87,12 @@ def judge(scenario: str, steps: list[dict[str, Any]]) -> None:
         assert Counter(timing["input"] for timing in timings)["click"] == 1
     if scenario == "traffic":
         assert set(board) == {490}
-        assert resumed == 2, "after the lost connection and in the second tab"
+        assert resumed == 3, "after the lost connection, in the second tab, and back in the first"
         assert hidden <= 2, "a tab behind another one may be hidden"
     if scenario == "lost_answer":
         assert resumed == 2, "after the lost answers and after the reload"
     if scenario == "small_window":
-        assert hidden == 1, "the step after the board was covered"
+        assert hidden == 2, "the steps after the board was covered and after the page was hidden"
         assert resumed == 1, "the step after the view was adopted"
 
 
