@@ -142,6 +142,7 @@ def decide(
         return answered(db, lab, newest, seq, action, timing)
     trials.moved_on(db, after)
     keep_seen(db, lab, participant)
+    lab.cache.drop((row.id, row.digest))  # or the cache would hold steps, and not as many trials as it can
     lab.cache.put((after.id, after.digest), kept)
     return shown(kept, seq)
 

@@ -31,3 +31,8 @@ class Recent:
             self._values.move_to_end(key)
             while len(self._values) > self.size:
                 self._values.popitem(last=False)
+
+    def drop(self, key: Hashable) -> None:
+        """Forget a value that is known to be past use, if it is there."""
+        with self._lock:
+            self._values.pop(key, None)

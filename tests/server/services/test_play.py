@@ -349,6 +349,15 @@ def one_arm(name: str) -> list[dict[str, Any]]:
     return [study.arm(name).model_dump()]
 
 
+def test_a_trial_takes_one_place_in_the_cache_however_long_it_is(lab: Lab) -> None:
+    key = playing(lab, "parent-child")
+    view = begun(lab, key)
+    for _ in range(4):
+        view = decide(lab, key, view, varied(view))
+    held = [name for name in lab.cache._values if name[0].endswith("-001")]
+    assert len(held) == 1
+
+
 def test_the_cache_keeps_what_was_used_last() -> None:
     recent = Recent(2)
     recent.put("a", 1)
