@@ -1,7 +1,6 @@
 """A robot's browser: cookies, redirects, and an outbox that sends the same body until it is answered."""
 
 import asyncio
-import ssl
 import time
 from collections.abc import Mapping
 from typing import Any, Self
@@ -22,10 +21,12 @@ class RobotError(Exception):
 class Browser:
     """One robot's connection to one server. `retries` counts requests that had to be sent again."""
 
-    def __init__(self, url: str, context: ssl.SSLContext, robot_signature: str, user_agent: str) -> None:
+    def __init__(
+        self, url: str, transport: httpx.AsyncBaseTransport, robot_signature: str, user_agent: str
+    ) -> None:
         self._client = httpx.AsyncClient(
             base_url=url,
-            transport=httpx.AsyncHTTPTransport(verify=context),
+            transport=transport,
             headers={"User-Agent": user_agent, "X-Hatlab-Robot": robot_signature},
             follow_redirects=True,
             timeout=httpx.Timeout(ANSWERS_MAX_S),

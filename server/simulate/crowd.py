@@ -119,7 +119,8 @@ async def play(
     context = ssl.create_default_context()
 
     async def one(index: int) -> Result:
-        async with places, Browser(crowd.url, context, sign(), USER_AGENT) as browser:
+        transport = httpx.AsyncHTTPTransport(verify=context)
+        async with places, Browser(crowd.url, transport, sign(), USER_AGENT) as browser:
             walker = robot(crowd, index, browser)
             if journals is not None:
                 journals.append(walker.result)

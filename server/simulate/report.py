@@ -38,11 +38,11 @@ def run(crowd: Crowd, sign: Callable[[], str], console: Console) -> bool:
 
 def table(crowd: Crowd, found: Summary) -> Table:
     """Lay the figures out, one line each."""
-    shown = Table(title=f"{crowd.slug}: {crowd.style} robots, seed {crowd.seed}", show_header=False)
-    shown.add_column()
-    shown.add_column(justify="right")
+    shown = Table("robots", crowd.slug, title_justify="left")
+    shown.columns[1].justify = "right"
     share = f"{found.successes / found.rounds:.1%}" if found.rounds else "-"
     for name, value in (
+        ("style, seed", f"{crowd.style}, {crowd.seed}"),
         ("finished", f"{found.finished} of {found.participants}"),
         ("rounds", f"{found.rounds:,}"),
         ("success", share),
