@@ -53,7 +53,8 @@ def options() -> Iterator[tuple[str, str]]:
     context = typer.Context(group)
     for command in group.list_commands(context):
         yield command, ""
-        for parameter in group.get_command(context, command).params:
+        found = group.get_command(context, command)
+        for parameter in found.params if found else ():
             yield from ((command, option) for option in parameter.opts if option.startswith("--"))
 
 
