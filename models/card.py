@@ -77,7 +77,11 @@ def _help(recipe: dict[str, Any]) -> str:
     """What training used besides the reward."""
     used = []
     if recipe.get("decoder", {}).get("target", "none") != "none":
-        used.append(f"decoder of {recipe['decoder']['target']} (information similarity, in training only)")
+        used.append(
+            f"{recipe['decoder']['target']} read from messages (information similarity, training only)"
+        )
+        if recipe["decoder"]["target"] == "coordinates" and recipe["model"]["channel"] == "prototype":
+            used.append("messages predicted from coordinates, so that near places get near messages")
     if any(
         phase.get("kind") == "imitate" or phase.get("imitation_weight") for phase in recipe.get("phase", ())
     ):

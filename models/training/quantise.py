@@ -33,6 +33,15 @@ def _spread(vectors: Tensor, count: int, generator: torch.Generator) -> Tensor:
     return centres
 
 
+def head_start(uses: Tensor) -> Tensor:
+    """What to add to the logits of one-hot names (K,): rare names gain, frequent ones lose, at most 1 nat.
+
+    A name that gains takes over where it was nearly chosen before, so that its places stay together.
+    """
+    share = (uses + 1) / (uses.sum() + len(uses))
+    return (-(share * len(uses)).log()).clamp(-1.0, 1.0)
+
+
 def revived(codebook: Tensor, uses: Tensor, vectors: Tensor, generator: torch.Generator) -> Tensor:
     """The codebook (K, D) with unused prototypes (uses (K,)) moved to vectors (M, D) far from theirs."""
     dead = torch.nonzero(uses == 0).squeeze(1)

@@ -28,7 +28,7 @@ from models.training.config import Phase, Recipe
 from models.training.curriculum import Progress, between, same_regime
 from models.training.enforcer import Enforcer
 from models.training.overrides import Overrides
-from models.training.quantise import kmeans, revived
+from models.training.quantise import head_start, kmeans, revived
 from models.training.reinforce import Learner, gradient_loss, shares
 from models.training.situations import beginning, generator
 from models.training.unroll import Beginning, Manner, Unrolled, unroll
@@ -189,13 +189,16 @@ class Trainer:
 
     @torch.no_grad()
     def _revive(self, seen: Unrolled) -> None:
-        channel, phase = self.learner.net.channel, self.phase
-        if not isinstance(channel, PrototypeChannel) or not phase.discrete or not phase.revive_every:
+        net, channel, phase = self.learner.net, self.learner.net.channel, self.phase
+        if net.architecture.tokens == 0 or not phase.discrete or not phase.revive_every:
             return
         early = self.at.update < 0.8 * phase.updates  # what is revived must have time to find its meaning
         if early and (self.at.update + 1) % phase.revive_every == 0:
-            draws = generator(self.recipe.seed + 1, self.at.total)
-            channel.codebook.copy_(revived(channel.codebook, self._uses, seen.raw[_uttered(seen)], draws))
+            if isinstance(channel, PrototypeChannel):
+                draws = generator(self.recipe.seed + 1, self.at.total)
+                channel.codebook.copy_(revived(channel.codebook, self._uses, seen.raw[_uttered(seen)], draws))
+            else:
+                net.speech[-1].bias += head_start(self._uses)
             self._uses.zero_()
 
     def _check(self) -> None:

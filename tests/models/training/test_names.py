@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from models.training.quantise import head_start
 from models.training.reinforce import NAMES_WEIGHT, upkeep_of_names
 
 
@@ -37,3 +38,11 @@ def test_what_nobody_can_hear_does_not_count() -> None:
 
 def test_other_channels_have_no_names() -> None:
     assert upkeep(torch.zeros(9, 9), channel="prototype") == 0
+
+
+def test_rare_names_get_a_head_start_and_frequent_ones_lose_theirs() -> None:
+    start = head_start(torch.tensor([0, 30, 100, 170]))
+    assert start[0] == 1.0
+    assert start.tolist() == sorted(start.tolist(), reverse=True)
+    assert start[3] < 0
+    assert float(head_start(torch.full((9,), 50)).abs().max()) == pytest.approx(0, abs=1e-6)
