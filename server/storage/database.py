@@ -7,7 +7,6 @@ read takes the lock first (`DbSession.hold`). SQLite runs with WAL and `synchron
 acknowledged survives power loss.
 """
 
-import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,21 +30,20 @@ from sqlalchemy.engine import URL
 from sqlalchemy.exc import ArgumentError, OperationalError
 
 from server.domain.errors import NotReadyError
+from server.storage.shared_writer import SharedWriter
 
 MIGRATIONS = Path(__file__).parents[2] / "migrations"
 BUSY_TIMEOUT_MS = 10_000
-CONNECTIONS = 45  # more than the 40 threads in which Starlette runs `def` routes
+CONNECTIONS = 45  # more than the 40 threads in which Starlette runs `def` routes, and the writer's
 Rows = Mapping[str, Any] | Sequence[Mapping[str, Any]]
 
 
 class DbSession:
     """One transaction, handed through the services to the query modules."""
 
-    def __init__(self, connection: Connection, writer: "threading.Lock | None", *, writable: bool) -> None:
+    def __init__(self, connection: Connection, writer: SharedWriter | None, *, writable: bool) -> None:
         self.connection = connection
-        self._writer = (
-            writer  # SQLite: threads of one process queue here, fairly, instead of polling the file
-        )
+        self._writer = writer
         self._writable = writable
         self._held = False
 
@@ -63,16 +61,14 @@ class DbSession:
         """
         if not self._writable:
             raise RuntimeError("a reading() transaction was asked to write")
-        if self._writer is None or self._held:
-            return
-        self._writer.acquire()
-        self._held = True
-        self.connection.exec_driver_sql("BEGIN IMMEDIATE")
+        if self._writer is not None and not self._held:
+            self.connection = self._writer.enter()
+            self._held = True
 
-    def release(self) -> None:
-        if self._held and self._writer is not None:
+    def release(self, *, keep: bool) -> None:
+        if self._writer is not None and self._held:
             self._held = False
-            self._writer.release()
+            self._writer.leave(keep=keep)
 
 
 class Database:
@@ -91,7 +87,7 @@ class Database:
             self._snapshots = self.engine.execution_options(
                 isolation_level="REPEATABLE READ", postgresql_readonly=True
             )
-        self._writer = threading.Lock() if self.is_sqlite else None
+        self._writer = SharedWriter(self.engine) if self.is_sqlite else None
 
     @contextmanager
     def reading(self) -> Iterator[DbSession]:
@@ -106,12 +102,12 @@ class Database:
             db = DbSession(connection, self._writer, writable=True)
             try:
                 yield db
-                connection.commit()
             except BaseException:
-                connection.rollback()  # before the lock is given to the next thread
+                connection.rollback()
+                db.release(keep=False)
                 raise
-            finally:
-                db.release()
+            connection.commit()
+            db.release(keep=True)
 
     def is_current(self) -> bool:
         """Whether every migration has been run. False for an empty or missing database."""
@@ -143,6 +139,8 @@ class Database:
         return self.url.render_as_string(hide_password=True)
 
     def close(self) -> None:
+        if self._writer is not None:
+            self._writer.close()
         self.engine.dispose()
 
 
