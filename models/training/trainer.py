@@ -198,7 +198,9 @@ class Trainer:
                 draws = generator(self.recipe.seed + 1, self.at.total)
                 channel.codebook.copy_(revived(channel.codebook, self._uses, seen.raw[_uttered(seen)], draws))
             else:
-                net.speech[-1].bias += head_start(self._uses)
+                last = net.speech[-1]
+                assert isinstance(last, torch.nn.Linear)
+                last.bias += head_start(self._uses)
             self._uses.zero_()
 
     def _check(self) -> None:
