@@ -4,37 +4,36 @@ The rule sees every car; the learner sees only itself and hears the others, visi
 there what the rule would do. Messages are learned through the listeners' gradient. Nobody is ever served the
 rule.
 
-A car on its way to a junction brakes if its next cell is taken now, unless it stands on its entry cell, where
-another car may appear on it; it brakes if a car of higher rank enters the same cell, or if its next cell is
-held by a car that brakes. Rank: inside a junction first, then further along the route, then the lower route.
-Whoever is inside a junction or past the last one follows only the last two rules and therefore never has to
-wait for long.
+A car brakes if its next cell is taken now, even if that car will probably leave it: people brake when they
+like, and whoever follows too closely hits them. Two exceptions: on the entry cell, where another car may
+appear on it, and while the junction is full, which would lock. It also brakes if a car of higher rank enters
+the same cell, or if its next cell is held by a car that brakes. Rank: inside a junction first, then further
+along the route, then the lower route.
 """
-
-from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from models.envs.traffic_junction import BRAKE, GAS, TrafficJunction, TrafficState
 
-Bools = NDArray[np.bool_]
 Ints = NDArray[np.int32]
+
+LOCK = 4  # cars inside, each in front of the next, that would wait for each other: the cells of a crossing
 
 
 def labels(env: TrafficJunction, state: TrafficState) -> Ints:
     """Return what the rule would do (B, N); BRAKE for empty slots."""
     here = env.cell_of(state)
     ahead = intent(env, state)
-    tables = _tables(env)
     last = env.route_cells.shape[1] - 1
     position = np.minimum(state.position, last)
-    rank = (tables.junction[state.route, position] * (last + 1) + position) * len(env.routes) + state.route
+    inside = state.alive & np.isin(here, env.roads.junction_cells)
+    rank = (inside * (last + 1) + position) * len(env.routes) + (len(env.routes) - 1 - state.route)
     pair = (ahead >= 0)[:, :, None] & ~np.eye(env.agents, dtype=np.bool_)  # (B, N, N): i's way, j in it
     holds = pair & (ahead[:, :, None] == here[:, None, :])
     yields = pair & (ahead[:, :, None] == ahead[:, None, :]) & (rank[:, None, :] > rank[:, :, None])
-    careful = tables.approach[state.route, position] & (position > 0) & holds.any(2)
+    locked = inside & (inside.sum(1, keepdims=True) >= LOCK)
+    careful = holds.any(2) & (position > 0) & ~locked
     moving = state.alive & ~careful
     while True:
         still = moving & ~((yields & moving[:, None, :]) | (holds & ~moving[:, None, :])).any(2)
@@ -49,18 +48,3 @@ def intent(env: TrafficJunction, state: TrafficState) -> Ints:
     leads_on = state.alive & (ahead < env.route_length[state.route])
     last = env.route_cells.shape[1] - 1
     return np.where(leads_on, env.route_cells[state.route, np.minimum(ahead, last)], np.int32(-1))
-
-
-@dataclass(frozen=True, slots=True)
-class _Tables:
-    """By route and position: is the cell a junction's, does a junction lie ahead of it."""
-
-    junction: Bools
-    approach: Bools
-
-
-@cache
-def _tables(env: TrafficJunction) -> _Tables:
-    inside = np.isin(env.route_cells, env.roads.junction_cells)  # (R, L)
-    later = np.flip(np.logical_or.accumulate(np.flip(inside, 1), 1), 1)
-    return _Tables(inside, later & ~inside)
