@@ -100,7 +100,11 @@ def test_a_drawn_gate_is_open_as_often_as_its_probability_says():
 
 @pytest.mark.parametrize(
     ("kind", "tokens", "size", "reason"),
-    [("prototype", 0, 4, "at least one"), ("one-hot", 3, 4, "as long as"), ("smoke", 1, 1, "unknown channel")],
+    [
+        ("prototype", 0, 4, "at least one"),
+        ("one-hot", 3, 4, "as long as"),
+        ("smoke", 1, 1, "unknown channel"),
+    ],
 )
 def test_a_channel_that_cannot_be_is_refused(kind, tokens, size, reason):
     with pytest.raises(ValueError, match=reason):

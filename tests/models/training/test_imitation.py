@@ -7,6 +7,7 @@ import pytest
 
 from models import rollout
 from models.envs import registry
+from models.envs.starts import human_start
 from models.envs.traffic_junction import BRAKE, GAS
 from models.training.imitation import intent, labels
 
@@ -43,16 +44,30 @@ def test_a_free_road_means_gas_and_an_empty_seat_brakes(env):
     assert labels(env, placed(env, (0, 3)))[0].tolist() == [GAS] + [BRAKE] * 9
 
 
-def test_a_car_keeps_its_distance_on_the_way_to_the_junction(env):
-    assert labels(env, placed(env, (0, 3), (0, 4)))[0, :2].tolist() == [BRAKE, GAS]
+@pytest.mark.parametrize("position", [1, 4, 5, 6, 7, 8, 12])
+def test_a_car_never_enters_a_cell_that_is_taken_now(env, position):
+    state = placed(env, (0, position), (0, position + 1))
+    assert labels(env, state)[0, :2].tolist() == [BRAKE, GAS]
 
 
 def test_a_car_on_its_entry_cell_follows_closely(env):
     assert labels(env, placed(env, (0, 0), (0, 1)))[0, :2].tolist() == [GAS, GAS]
 
 
-def test_past_the_junction_cars_follow_closely(env):
-    assert labels(env, placed(env, (0, 9), (0, 10)))[0, :2].tolist() == [GAS, GAS]
+def test_a_full_junction_turns_instead_of_locking(env):
+    straight = (0, 3, 6, 9)
+    assert labels(env, placed(env, *((route, 6) for route in straight)))[0, :4].tolist() == [GAS] * 4
+
+
+def test_who_brakes_at_random_is_hardly_ever_hit_from_behind(env):
+    begun = human_start(env, np.arange(300, dtype=np.uint64))
+    state, draws, hit = begun.state, np.random.default_rng(0), np.zeros(300, np.bool_)
+    for _ in range(40):
+        actions, driving = labels(env, state), state.alive[:, -1]
+        actions[:, -1] = np.where(draws.random(300) < 0.3, BRAKE, actions[:, -1])
+        state, _ = env.step(state, actions)
+        hit |= env.collided(state)[:, -1] & driving
+    assert hit.mean() < 0.05
 
 
 def test_whoever_is_inside_the_junction_goes_first(env):
