@@ -200,7 +200,7 @@ class Trainer:
             else:
                 last = net.speech[-1]
                 assert isinstance(last, torch.nn.Linear)
-                last.bias += head_start(self._uses)
+                last.bias.add_(head_start(self._uses))
             self._uses.zero_()
 
     def _check(self) -> None:
