@@ -22,7 +22,8 @@ OTREE_FORMS, OTREE_LIVE = 56.0, 166.0
 """Best figures of oTree 6.0.15: submissions/s of form pages, actions/s of live pages."""
 STUDY = "traffic-junction"
 WINDOWS = 3
-SPARE = 40
+PREPARING, PREPARING_S = 12, 8.0
+SPARE = 60
 """People who follow those who have played all their rounds."""
 AIM_CPU_MS, AIM_P99_MS = 1.5, 50.0
 AIM_RATE = {"sqlite": 200.0, "postgresql": 600.0}
@@ -86,7 +87,16 @@ async def _measure(
     house: Served, slug: str, people: int, levels: Sequence[Level], seconds: float
 ) -> list[Figure]:
     seats = await load.enter(house.url, "127.0.0.1", house.port, slug, people, house.sign)
+    await _prepare(seats)
     return [await _level(house, seats, level, seconds) for level in levels]
+
+
+async def _prepare(queue: list[Seat]) -> None:
+    """Play until the workers have met the situations: how a round begins is computed once and kept."""
+    async with AsyncExitStack() as stack:
+        players = [await stack.enter_async_context(load.player(queue)) for _ in range(PREPARING)]
+        await load.warm_up(players)
+        await load.play(players, PREPARING_S, None)
 
 
 async def _level(house: Served, queue: list[Seat], level: Level, seconds: float) -> Figure:
