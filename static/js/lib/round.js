@@ -16,7 +16,7 @@ import { onward, prompt, result } from "./words.js";
  * @template {RoundView} [View=RoundView]
  * @typedef {object} RoundParameters
  * @property {View & Brought} view
- * @property {(action: number, timing: import("./types.js").Timing, view: View) => Promise<(View & Brought) | null>} decide
+ * @property {Decide<View>} decide
  * @property {((message: Message) => void) | null} say
  * @property {((view: View) => Promise<void>) | null} proceed
  * @property {((view: View) => void) | null} shown
@@ -30,6 +30,14 @@ import { onward, prompt, result } from "./words.js";
  * @property {(view: View) => Partial<Record<KeyName, number>>} keys
  * @property {(action: number) => void} taken a decision was made: keys go flat, nothing else changes
  */
+
+/** @type {Attention | undefined} */ let own;
+
+/** For experiments that bring no attention of their own: the page's visibility. */
+function ownAttention() {
+  own ??= new Attention().watch(document);
+  return own;
+}
 
 /** There is one display, whatever the number of rounds. */
 const display_frames = new FrameMeter();
@@ -45,7 +53,7 @@ export class Round {
   constructor(display, parameters) {
     this.display = display;
     this.parameters = parameters;
-    this.attention = parameters.attention?.() ?? new Attention().watch(document);
+    this.attention = parameters.attention?.() ?? ownAttention();
     const strip = parameters.say ? null : newStrip();
     this.say = parameters.say ?? sayIn(/** @type {HTMLElement} */ (strip));
     this.strip = strip;
@@ -95,7 +103,8 @@ export class Round {
       const decision = await this.responder.ask({
         write: () => {
           draw(view);
-          this.parameters.shown?.(view);
+          // After the frame: what is noted about the picture must not delay it.
+          setTimeout(() => this.parameters.shown?.(view));
         },
         keys: keys(view),
         resumed: view.resumed ?? false,

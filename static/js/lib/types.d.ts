@@ -100,7 +100,12 @@ export interface Timing {
   input: "key" | "click";
 }
 
-export type Decide<View extends RoundView> = (action: number, timing: Timing) => Promise<View & Brought>;
+/** Sends a decision about `view` and brings the view that follows; null: this page has no part in it any more. */
+export type Decide<View extends RoundView> = (
+  action: number,
+  timing: Timing,
+  view: View,
+) => Promise<(View & Brought) | null>;
 
 /** One line for the strip below the board. */
 export interface Message {

@@ -1,7 +1,7 @@
 // @ts-check
 // Parent & Lost Child as a jsPsych 8 plugin: one trial is one round, in the role that the view names.
 //
-// It knows no server. `view` is the round as it stands; `decide(action, timing)` brings the view that follows. Actions:
+// It knows no server. `view` is the round as it stands; `decide(action, timing, view)` brings the view that follows. Actions:
 // parent 0 up, 1 right, 2 down, 3 left; child: the number of the sign that is said. See tests/static/example/.
 
 import { ParameterType } from "jspsych";
@@ -26,7 +26,7 @@ const PACE_MS = 400;
 const PARAMETERS = {
   /** The round as it stands (RoundView, role "parent" or "child"). */
   view: { type: ParameterType.OBJECT, default: undefined },
-  /** async (action, timing) → the view that follows. */
+  /** async (action, timing, view) → the view that follows. */
   decide: { type: ParameterType.FUNCTION, default: undefined },
   /** (message) → shows it; null: the plugin makes a strip of its own below the board. */
   say: { type: ParameterType.FUNCTION, default: null },

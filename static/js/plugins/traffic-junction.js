@@ -1,7 +1,7 @@
 // @ts-check
 // Traffic Junction as a jsPsych 8 plugin: one trial is one round at the wheel of the yellow car.
 //
-// It knows no server. `view` is the round as it stands; `decide(action, timing)` brings the view that follows. Actions:
+// It knows no server. `view` is the round as it stands; `decide(action, timing, view)` brings the view that follows. Actions:
 // 0 go (key J), 1 brake (key F). See tests/static/example/.
 
 import { ParameterType } from "jspsych";
@@ -21,7 +21,7 @@ const PEDALS = /** @type {const} */ ({ go: 0, brake: 1 });
 const PARAMETERS = {
   /** The round as it stands (RoundView, role "driver", with its roads). */
   view: { type: ParameterType.OBJECT, default: undefined },
-  /** async (action, timing) → the view that follows. */
+  /** async (action, timing, view) → the view that follows. */
   decide: { type: ParameterType.FUNCTION, default: undefined },
   /** (message) → shows it; null: the plugin makes a strip of its own below the board. */
   say: { type: ParameterType.FUNCTION, default: null },
