@@ -6,7 +6,6 @@ Without them they skip loudly, or fail where nothing may skip.
 import os
 import shutil
 import subprocess
-import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -45,10 +44,15 @@ def browser() -> None:
     told = f"browser tests need {', '.join(absent)}"
     if os.environ.get("HATLAB_REQUIRE_BROWSER") == "1":
         pytest.fail(told)
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
-        warnings.warn(told, stacklevel=1)
     pytest.skip(told)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """A skipped browser test is said at the end, where nobody can miss it."""
+    skipped = [each for each in terminalreporter.stats.get("skipped", []) if "tests/e2e" in each.nodeid]
+    if skipped:
+        told = f"{len(skipped)} BROWSER TESTS SKIPPED: they need {', '.join(missing())}"
+        terminalreporter.write_line(f"*** {told} ***", yellow=True, bold=True)
 
 
 @pytest.fixture(scope="module")
