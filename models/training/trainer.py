@@ -183,8 +183,8 @@ class Trainer:
             begin = Beginning(seen.states[-1], seen.memory)
 
     def _count(self, seen: Unrolled) -> None:
-        """Count the prototypes in use."""
-        if isinstance(self.learner.net.channel, PrototypeChannel):
+        """Count the tokens in use."""
+        if self.recipe.model.tokens:
             self._uses += torch.bincount(seen.token[_uttered(seen)], minlength=len(self._uses))
 
     @torch.no_grad()
