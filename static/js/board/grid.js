@@ -167,7 +167,7 @@ function frame() {
 }
 
 /**
- * The line where someone walked: a ring at the start, a dot at each cell between (none behind the walker's head).
+ * The line where someone walked: a ring at the start, a dot at each cell between (neither behind the walker).
  * @param {number} size
  * @param {Cell[]} cells
  */
@@ -183,7 +183,7 @@ function trail(size, cells) {
       .slice(1, -1)
       .filter((point) => !isAt(point, end))
       .map(({ x, y }) => h("circle", { class: "trail-dot", cx: x, cy: y, r: 6 })),
-    h("circle", { class: "trail-start", cx: start.x, cy: start.y, r: 9 }),
+    !isAt(start, end) && h("circle", { class: "trail-start", cx: start.x, cy: start.y, r: 9 }),
   ].filter((node) => node !== false);
 }
 
