@@ -6,7 +6,6 @@ import io
 import json
 import tracemalloc
 import zipfile
-from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
@@ -19,31 +18,28 @@ from server.domain.errors import BadInputError, NotFoundError
 from server.domain.study import read
 from server.services import codebook, studies
 from server.services.export import export, stream_zip
-from server.services.lab import Lab, prepare
+from server.services.lab import Lab
 from server.settings import Settings
+from server.storage.database import Database
+from tests.server.services.steps import launch
 
 NOW = datetime(2026, 1, 2, 4, 0, tzinfo=UTC)
 TABLES = ("participants", "trials", "steps", "agents", "codebook")
 
 
-@pytest.fixture
-def lab(tmp_path: Path) -> Iterator[Lab]:
-    settings = Settings(
-        database_url=f"sqlite:///{tmp_path / 'hatlab.sqlite3'}",
-        bundles=tmp_path / "none",
-        secret_key="s" * 40,
-    )
-    prepare(settings)
-    opened = Lab.open(settings)
-    lab = Lab(settings, opened.database, {}, (), opened.secret_key, now=lambda: NOW)
+def prepared(database: Database) -> Lab:
+    """A lab with two launched studies and a clock that stands still."""
+    settings = Settings(database_url=database.url.render_as_string(hide_password=False))
+    lab = Lab(settings, database, {}, (), "s" * 40, now=lambda: NOW)
     for name, slug in (("parent-child", "signs"), ("traffic-junction", "cars")):
         values = {**studies.template(name), "slug": slug, "trials_per_block": 3}
-        with lab.database.writing() as db:
-            db.hold()
-            row = studies.studies.add(db, slug, "A study", "live", "", canonical.utc_text(NOW))
-            studies.freeze(db, lab, row, read(values))
-    yield lab
-    opened.database.close()
+        launch(lab, read(values))
+    return lab
+
+
+@pytest.fixture
+def lab(database: Database) -> Lab:
+    return prepared(database)
 
 
 def tables(folder: Path) -> dict[str, list[dict[str, str]]]:
@@ -245,7 +241,10 @@ def test_a_folder_with_something_in_it_is_left_alone(lab: Lab, tmp_path: Path) -
     assert (tmp_path / "kept.txt").read_text() == "mine"
 
 
-def test_memory_does_not_grow_with_the_number_of_people(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_does_not_grow_with_the_number_of_people(
+    sqlite_database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lab = prepared(sqlite_database)
     monkeypatch.setattr("server.services.export.PEOPLE_A_PAGE", 2)
     monkeypatch.setattr("server.services.export.ROWS_A_PIECE", 100)
 
