@@ -90,6 +90,7 @@ def prototypes(lexicon: Lexicon) -> Chart:
             "kind": "null" if lexicon.null[token] else "says where",
         }
         for token, (x, y) in enumerate(lexicon.coordinates)
+        if lexicon.tokens <= FEW or lexicon.uses[token] > 0
     ]
     side = 380
     domain_x, domain_y = _square(lexicon)
@@ -102,13 +103,13 @@ def prototypes(lexicon: Lexicon) -> Chart:
         color=_kinds(),
         size=alt.value(620) if few else alt.Size("share:Q", scale=alt.Scale(range=[30, 500]), legend=None),
     )
-    names = base.mark_text(fontSize=14 if few else 10, fontWeight=600).encode(
+    names = base.mark_text(fontSize=14 if few else 9, fontWeight=600 if few else 400).encode(
         text="token:N",
         color=alt.condition(alt.datum.kind == "null", alt.value(INK), alt.value("white"))
         if few
         else alt.value(INK),
     )
-    title = _title("Prototypes", f"{lexicon.tokens} tokens on their first two principal components")
+    title = _title("Prototypes", f"{len(rows)} tokens on their first two principal components")
     return (dots + names).properties(width=side, height=side, title=title)
 
 
@@ -215,7 +216,9 @@ def token_use(lexicon: Lexicon) -> Chart:
                 "token:N",
                 sort=[str(row["token"]) for row in rows],
                 title="token",
-                axis=alt.Axis(labelAngle=0, labelOverlap=False),
+                axis=alt.Axis(
+                    labelAngle=0, labelOverlap=False, labelFontSize=12 if lexicon.tokens <= FEW else 9
+                ),
             ),
             y=alt.Y("share:Q", title="share of messages", axis=alt.Axis(format="%")),
             color=_kinds(),
@@ -250,7 +253,7 @@ def null_tokens(lexicon: Lexicon) -> Chart:
         y=alt.Y(
             "told:Q",
             title="information about the cell (bits)",
-            scale=alt.Scale(domain=[0, max(info.prior_bits, 0.1)]),
+            scale=alt.Scale(domain=[0, 1.08 * max(info.prior_bits, float(info.told_bits.max()), 0.1)]),
         ),
     )
     dots = base.mark_circle(size=90, opacity=0.85).encode(color=_kinds())
@@ -262,7 +265,7 @@ def null_tokens(lexicon: Lexicon) -> Chart:
     )
     limits = [
         {"bits": info.needed_bits, "text": "null below this: 0.1 · H(cell)"},
-        {"bits": info.prior_bits, "text": "all there is to tell: H(cell)"},
+        {"bits": info.prior_bits, "text": "H(cell): the whole place, on average"},
     ]
     rules = _chart(limits).encode(y="bits:Q")
     lines = rules.mark_rule(color=SOFT, strokeDash=[4, 4])
