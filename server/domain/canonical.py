@@ -27,7 +27,7 @@ def sha256(text: str) -> str:
 
 def utc_text(moment: datetime) -> str:
     """Milliseconds and a Z; texts of this form sort as their times do."""
-    return moment.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%S.") + f"{moment.microsecond // 1000:03d}Z"
+    return moment.astimezone(UTC).isoformat(timespec="milliseconds")[: -len("+00:00")] + "Z"
 
 
 def utc_moment(text: str) -> datetime:

@@ -6,10 +6,13 @@ leaves while nobody else wants in commits for all. Nobody's `leave` returns befo
 nothing is answered that is not durable; a commit that fails, fails for all of them.
 """
 
+import sqlite3
 import threading
 from contextlib import suppress
 
 from sqlalchemy import Connection, Engine
+
+from server.domain.errors import NotReadyError
 
 TURNS_MAX = 64  # in one transaction, so that a steady stream of writers cannot put the commit off for ever
 
@@ -56,13 +59,12 @@ class SharedWriter:
         shared, connection = self._shared, self._connection
         assert shared is not None
         assert connection is not None
-        try:
-            if not keep:
-                connection.exec_driver_sql("ROLLBACK TO turn")
-            connection.exec_driver_sql("RELEASE turn")
-        except BaseException as error:
-            self._end(error)
-            raise
+        if not keep:
+            try:
+                raw(connection).execute("ROLLBACK TO turn")
+            except BaseException as error:
+                self._end(error)
+                raise
         shared.turns += 1
         if self._waiting and shared.turns < TURNS_MAX:
             self._turn.release()
@@ -80,13 +82,17 @@ class SharedWriter:
             self._connection = self._engine.connect()
         if self._shared is None:
             self._shared = Shared()
-            self._connection.exec_driver_sql("BEGIN IMMEDIATE")
-        self._connection.exec_driver_sql("SAVEPOINT turn")
+            try:
+                raw(self._connection).execute("BEGIN IMMEDIATE")
+            except sqlite3.OperationalError as error:
+                raise NotReadyError(f"the database takes no writes: {error}") from error
+        raw(self._connection).execute("SAVEPOINT turn")  # a later one of the same name covers this one
         return self._connection
 
     def _commit(self, connection: Connection) -> None:
         try:
             connection.commit()
+            raw(connection).commit()  # where nothing went through SQLAlchemy, it has nothing to commit
         except BaseException as error:
             self._end(error)
             raise
@@ -98,7 +104,15 @@ class SharedWriter:
         if error is not None and self._connection is not None:
             with suppress(Exception):
                 self._connection.rollback()
+                raw(self._connection).rollback()
         if shared is not None:
             shared.error = error
             shared.over.set()
         self._turn.release()
+
+
+def raw(connection: Connection) -> sqlite3.Connection:
+    """The driver's connection: for a bare word SQLAlchemy costs more than SQLite."""
+    driver = connection.connection.driver_connection
+    assert isinstance(driver, sqlite3.Connection)
+    return driver

@@ -7,6 +7,7 @@ from time import monotonic
 import pytest
 from sqlalchemy import event as hooks
 
+from server.domain.errors import NotReadyError
 from server.storage import installation
 from server.storage.database import Database
 
@@ -140,8 +141,6 @@ def test_nothing_returns_before_it_is_durable(sqlite_database: Database) -> None
 
 
 def test_a_database_that_stays_locked_is_an_error_and_not_a_hang(sqlite_database: Database) -> None:
-    from sqlalchemy.exc import OperationalError
-
     other = Database(f"sqlite:///{sqlite_database.url.database}")
     hooks.listen(
         sqlite_database.engine, "connect", lambda connection, _: connection.execute("PRAGMA busy_timeout=50")
@@ -153,7 +152,7 @@ def test_a_database_that_stays_locked_is_an_error_and_not_a_hang(sqlite_database
         began = monotonic()
         raised = together(*(writer(sqlite_database, f"w{n}", gate) for n in range(4)))
         assert monotonic() - began < 5
-    assert all(isinstance(error, OperationalError) for error in raised)
+    assert all(isinstance(error, NotReadyError) for error in raised)
     other.close()
     with sqlite_database.writing() as db:
         installation.keep(db, "mine", "1")
