@@ -61,8 +61,9 @@ torture: $(DEV) ## kill -9 the server 20 times under 20 robots, on SQLite and on
 screenshots: $(RUNTIME) $(NODE) ## take the pictures of README and docs again (needs Node 20 and Chromium)
 	node tests/e2e/screenshots.mjs docs/images
 
-docs: $(DEV) ## write the generated documents again (data dictionary)
+docs: $(DEV) ## write the generated documents again (data dictionary, released agents)
 	$(BIN)/python -m server.services.codebook > docs/data-dictionary.md
+	$(BIN)/python -m models.roster > docs/agents.md
 
 hooks: ## run `make check` before every commit
 	@printf '#!/bin/sh\nexec make check\n' > .git/hooks/pre-commit && chmod +x .git/hooks/pre-commit

@@ -19,9 +19,9 @@ const PASSWORD = randomBytes(12).toString("hex");
 const ROBOTS = 4;
 /** Steps after which the pictures of a round are taken: enough for a path, too few for the end. */
 const STEPS = 4;
-/** Triangles on a picture of the junction, at least; looked for in so many rounds. */
-const TRIANGLES = 2;
-const ROUNDS = 10;
+/** Triangles on the picture of the junction, at least; they are looked for in so many rounds. */
+const TRIANGLES = 3;
+const ROUNDS = 6;
 
 /**
  * A migrated database and a server of its own, for as long as `use` runs.
@@ -39,7 +39,9 @@ async function served(use) {
   await hatlab("init");
   const server = spawn(HATLAB, ["serve", "--port", "0"], { env, stdio: ["ignore", "pipe", "inherit"] });
   try {
-    await use(await addressOf(server), hatlab);
+    const url = await addressOf(server);
+    await fetch(`${url}/healthz`); // it listens before its agents are loaded: this waits for them
+    await use(url, hatlab);
   } finally {
     server.kill();
     await new Promise((ended) => server.once("exit", ended));
@@ -126,20 +128,22 @@ async function asParent(page) {
   await playing(page);
   await go(page, ["ArrowUp", "ArrowUp", "ArrowRight"], STEPS);
   await picture(page, "parent");
-  await go(page, TOUR);
-  await picture(page, "parent-over");
 }
 
-/** @param {Page} page */
+/**
+ * One sign after the other until one of them brings the parent.
+ * @param {Page} page
+ */
 async function asChild(page) {
   await playing(page);
   await page.keyboard.press("5");
-  await onward(page);
-  await playing(page);
+  for (let sign = 1, found = false; sign <= 9 && !found; sign += 1) {
+    await onward(page);
+    await playing(page);
+    await page.keyboard.press(String(sign));
+    found = Boolean((await result(page))?.includes("found you"));
+  }
   await picture(page, "child");
-  await page.keyboard.press("3");
-  await result(page);
-  await picture(page, "child-over");
 }
 
 /**
@@ -161,13 +165,12 @@ async function drive(page) {
   await readInstructions(page);
   await go(page, ["j", "f", "j"]);
   for (let round = 0, warned = false; round < ROUNDS && !warned; round += 1) {
+    await go(page, ["j"]);
     await onward(page);
     await go(page, ["j"], STEPS);
     warned = (await playing(page)) && (await page.locator(".board-wrap .caution").count()) >= TRIANGLES;
   }
   await picture(page, "driver");
-  await go(page, ["j"]);
-  await picture(page, "driver-over");
 }
 
 /**
@@ -181,9 +184,8 @@ async function admin(page, url) {
   await page.keyboard.press("Enter");
   await page.getByRole("heading", { name: "Studies" }).waitFor();
   for (const [name, path] of [
-    ["admin-studies", "/admin"],
     ["admin-build", "/admin/studies/traffic-junction"],
-    ["admin-monitor", "/admin/studies/traffic-junction/monitor?mode=robot"],
+    ["admin-monitor", "/admin/studies/traffic-junction/monitor?mode=robot&show=finished"],
     ["admin-agents", "/admin/agents"],
   ]) {
     await page.goto(`${url}${path}`);
