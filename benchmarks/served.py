@@ -34,6 +34,8 @@ from server.storage import studies as study_rows
 DatabaseName = Literal["sqlite", "postgresql"]
 SECRET_KEY = "measurements-only-" + "0" * 32
 START_MAX_S = 90.0
+NOT_PASSED_ON = ("HATLAB_", "OMP_", "OPENBLAS_")
+"""Variables of this shell that would change what is measured."""
 HATLAB = (sys.executable, "-c", "from server.cli import main; main()")
 """The command `hatlab` of this environment."""
 
@@ -75,13 +77,12 @@ class Served:
     @property
     def environment(self) -> Mapping[str, str]:
         return {
-            **{name: value for name, value in os.environ.items() if not name.startswith("HATLAB_")},
+            **{name: value for name, value in os.environ.items() if not name.startswith(NOT_PASSED_ON)},
             "HATLAB_DATABASE_URL": self.database_url,
             "HATLAB_SECRET_KEY": SECRET_KEY,
             "HATLAB_ADMIN_PASSWORD": "measurements only",
             "HATLAB_PUBLIC_URL": self.url,
             **({"HATLAB_BUNDLES": str(self.bundles)} if self.bundles else {}),
-            "OMP_NUM_THREADS": "1",
         }
 
     def sign(self, slug: str) -> str:
