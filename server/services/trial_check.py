@@ -25,6 +25,8 @@ from server.services.session import Session, spec_of
 from server.storage.events import EventRow
 from server.storage.trials import TrialRow
 
+SAID_MAX = 200
+
 
 class DifferenceError(Exception):
     """What is stored is not what the replay gives; says where."""
@@ -55,6 +57,8 @@ def check(
             decide_again(lab, spec, bodies, audit)
     except (DifferenceError, HatlabError) as error:
         return f"{row.id} {error}"
+    except Exception as error:  # noqa: BLE001 (a row may hold anything; the others are still to be checked)
+        return f"{row.id} cannot be replayed: {said_of(error)}"
     return None
 
 
@@ -106,7 +110,10 @@ def replayed(lab: Lab, spec: TrialSpec, stored: Sequence[EventRow], bodies: Sequ
 
 
 def said_of(error: Exception) -> str:
-    return f"{error.args[0]!r} is missing" if isinstance(error, KeyError) else str(error)
+    """An error in one line, never empty."""
+    if isinstance(error, KeyError):
+        return f"{error.args[0]!r} is missing"
+    return " ".join(str(error).split())[:SAID_MAX] or type(error).__name__
 
 
 def started(at: Trial, body: Mapping[str, Any]) -> Trial:

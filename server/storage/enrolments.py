@@ -61,6 +61,10 @@ def identity_of(db: DbSession, participant_id: str) -> IdentityRow:
     )
 
 
+def consent_of(db: DbSession, participant_id: str) -> ConsentRow:
+    return ConsentRow._make(db.read(select(consent).where(consent.c.participant_id == participant_id)).one())
+
+
 def allocation_of(db: DbSession, participant_id: str) -> AllocationRow:
     return AllocationRow._make(
         db.read(select(allocation).where(allocation.c.participant_id == participant_id)).one()
