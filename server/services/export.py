@@ -1,19 +1,20 @@
 """A study's data as tidy CSV: to a folder, or as a zip that is streamed while it is made.
 
 Memory does not grow with the study: people are read a page at a time, and a table leaves in pieces. One
-reading transaction spans all tables, so that they belong together. The manifest is written last: an export
-without one was interrupted. What the columns mean stands in `server.services.codebook`.
+reading transaction spans all tables, so that they belong together. A folder gets its tables side by side; a
+zip holds one file after the other, so that its people are read once for each. The manifest is written last: an
+export without one was interrupted. What the columns mean stands in `server.services.codebook`.
 """
 
-import csv
-import hashlib
 import io
 import json
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
-from itertools import groupby, islice
+from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -26,15 +27,14 @@ from server.domain.participation import has_left
 from server.domain.study import from_json as definition_of
 from server.services import codebook, tidy, tracks
 from server.services.lab import Lab
+from server.services.sheets import Sheet
 from server.storage import exports
 from server.storage.database import DbSession
 
 Mode = Literal["live", "test", "preview", "robot"]
 MODES: tuple[Mode, ...] = get_args(Mode)
 PEOPLE_A_PAGE = 16
-ROWS_A_PIECE = 1_000
-UNSAFE = frozenset("=+-@\t\r")
-"""A spreadsheet runs a text that begins with one of these."""
+MANIFEST = "manifest.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +51,20 @@ class Choice:
         return ("practice", "main") if self.practice else ("main",)
 
 
-@dataclass(frozen=True, slots=True)
 class _Page:
     """Some people with their trials; `left` holds those who were not heard of for longer than the lease."""
 
-    people: dict[str, tidy.Row]
-    left: frozenset[str]
-    stories: tuple[tidy.Story, ...]
+    def __init__(
+        self, people: Sequence[tidy.Row], left: frozenset[str], stories: Iterator[tidy.Story]
+    ) -> None:
+        self.people = {person["id"]: person for person in people}
+        self.left = left
+        self._stories = stories
+
+    @cached_property
+    def stories(self) -> tuple[tidy.Story, ...]:
+        """The trials, read when a table asks for them."""
+        return tuple(self._stories)
 
 
 def export(
@@ -69,15 +76,21 @@ def export(
         NotFoundError: there is no such study.
         BadInputError: an unknown mode, or `out_dir` is not an empty folder.
     """
-    with lab.database.reading() as db:
+    with lab.database.reading() as db, ExitStack() as stack:
         choice = choose(db, slug, modes, practice=practice)
         _prepare(out_dir)
-        manifest = _Manifest()
-        for name, pieces in _files(db, lab, choice, manifest):
-            with (out_dir / name).open("wb") as file:
-                for piece in pieces:
-                    file.write(piece)
-    return manifest.content
+        source = _Source(db, lab, choice)
+        sheets = [Sheet(table) for table in (*_BUILDERS, "codebook")]
+        files = [stack.enter_context((out_dir / sheet.name).open("wb")) for sheet in sheets]
+        for page in source.pages():
+            for sheet, file, build in zip(sheets, files, _BUILDERS.values(), strict=False):
+                file.writelines(sheet.pieces(build(slug, page)))
+        files[-1].writelines(sheets[-1].pieces(codebook.rows()))
+        for sheet, file in zip(sheets, files, strict=True):
+            file.writelines(sheet.pieces())
+    manifest = source.manifest(sheets)
+    (out_dir / MANIFEST).write_bytes(_text(manifest))
+    return manifest
 
 
 def stream_zip(lab: Lab, slug: str, modes: Sequence[str], *, practice: bool = False) -> Iterator[bytes]:
@@ -111,20 +124,24 @@ def _prepare(out_dir: Path) -> None:
 
 def _zipped(lab: Lab, choice: Choice) -> Iterator[bytes]:
     sink = _Sink()
-    moment = lab.now()
     with (
         lab.database.reading() as db,
         zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
     ):
-        for name, pieces in _files(db, lab, choice, _Manifest()):
-            entry = zipfile.ZipInfo(f"{choice.slug}/{name}", moment.timetuple()[:6])
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            with archive.open(entry, "w", force_zip64=True) as file:
-                for piece in pieces:
+        source = _Source(db, lab, choice)
+        sheets = [Sheet(table) for table in (*_BUILDERS, "codebook")]
+        for sheet in sheets:
+            with archive.open(source.entry(sheet.name), "w", force_zip64=True) as file:
+                for piece in source.pieces(sheet):
                     file.write(piece)
                     yield from sink.taken()
+        archive.writestr(source.entry(MANIFEST), _text(source.manifest(sheets)))
         yield from sink.taken()
     yield from sink.taken()
+
+
+def _text(manifest: dict[str, Any]) -> bytes:
+    return json.dumps(manifest, indent=2, ensure_ascii=False).encode() + b"\n"
 
 
 class _Sink(io.RawIOBase):
@@ -146,100 +163,59 @@ class _Sink(io.RawIOBase):
             self._pieces.clear()
 
 
-class _Manifest:
-    """Counts and hashes the files as they go out."""
+class _Source:
+    """What one transaction shows of a study, at one moment."""
 
-    def __init__(self) -> None:
-        self.content: dict[str, Any] = {"files": {}}
+    def __init__(self, db: DbSession, lab: Lab, choice: Choice) -> None:
+        self._db = db
+        self._choice = choice
+        self._moment = lab.now()
+        self._versions = exports.version_rows(db, choice.study_id)
+        self._lease_began = {
+            row["number"]: canonical.minutes_before(self._moment, definition_of(row["definition"]).lease_min)
+            for row in self._versions
+        }
 
-    def pieces(self, name: str, rows: Iterable[Sequence[Any]]) -> Iterator[bytes]:
-        """Give the CSV text of a table, and remember its rows, size and hash."""
-        table = Path(name).stem
-        digest, count, size = hashlib.sha256(), 0, 0
-        for lines, piece in csv_pieces(table, rows):
-            digest.update(piece)
-            count, size = count + lines, size + len(piece)
-            yield piece
-        self.content["files"][name] = {"rows": count, "bytes": size, "sha256": digest.hexdigest()}
+    def pages(self) -> Iterator[_Page]:
+        """Everybody, a page at a time, by id."""
+        db, choice, after = self._db, self._choice, ""
+        while people := exports.participant_page(db, choice.study_id, choice.modes, after, PEOPLE_A_PAGE):
+            after = people[-1]["id"]
+            left = frozenset(person["id"] for person in people if self._left(person))
+            yield _Page(people, left, _stories(db, [person["id"] for person in people], choice.phases))
 
+    def _left(self, person: tidy.Row) -> bool:
+        began = self._lease_began[person["study_version"]]
+        return has_left(person["status"], person["last_seen_utc"], began)
 
-def csv_pieces(table: str, rows: Iterable[Sequence[Any]]) -> Iterator[tuple[int, bytes]]:
-    """Give RFC 4180 text in pieces, each with its number of rows; the first holds the header, and no row."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\r\n")
-    writer.writerow(codebook.header(table))
-    guarded = _guarded(table)
-    iterator = iter(rows)
-    count = 0
-    while True:
-        yield count, text.getvalue().encode()
-        text.seek(0)
-        text.truncate()
-        batch = [safe(row, guarded) for row in islice(iterator, ROWS_A_PIECE)]
-        count = len(batch)
-        if not batch:
+    def pieces(self, sheet: Sheet) -> Iterator[bytes]:
+        """Give one table, or the codebook, from its header to its end."""
+        build = _BUILDERS.get(Path(sheet.name).stem)
+        if build is None:
+            yield from sheet.pieces(codebook.rows())
             return
-        writer.writerows(batch)
+        for page in self.pages():
+            yield from sheet.pieces(build(self._choice.slug, page))
+        yield from sheet.pieces()
 
+    def entry(self, name: str) -> zipfile.ZipInfo:
+        """Describe a file of the zip."""
+        entry = zipfile.ZipInfo(f"{self._choice.slug}/{name}", self._moment.timetuple()[:6])
+        entry.compress_type = zipfile.ZIP_DEFLATED
+        return entry
 
-def _guarded(table: str) -> tuple[int, ...]:
-    columns = codebook.TABLES.get(table, codebook.CODEBOOK)
-    return tuple(index for index, column in enumerate(columns) if column.type == "string")
-
-
-def safe(row: Sequence[Any], guarded: Sequence[int]) -> Sequence[Any]:
-    """Put `'` before the texts that a spreadsheet would run.
-
-    >>> safe(["=1+1", -2], [0])
-    ["'=1+1", -2]
-    """
-    for index in guarded:
-        if row[index] and row[index][0] in UNSAFE:
-            break
-    else:
-        return row
-    return [
-        f"'{cell}" if index in guarded and cell and cell[0] in UNSAFE else cell
-        for index, cell in enumerate(row)
-    ]
-
-
-def _files(
-    db: DbSession, lab: Lab, choice: Choice, manifest: _Manifest
-) -> Iterator[tuple[str, Iterator[bytes]]]:
-    """Give every file as name and pieces; each must be used up before the next is asked for."""
-    moment = lab.now()
-    versions = exports.version_rows(db, choice.study_id)
-    leases = {row["number"]: definition_of(row["definition"]).lease_min for row in versions}
-
-    def left(person: tidy.Row) -> bool:
-        lease_began = canonical.minutes_before(moment, leases[person["study_version"]])
-        return has_left(person["status"], person["last_seen_utc"], lease_began)
-
-    for table, build in _BUILDERS.items():
-        pages = _pages(db, choice, left, with_events=table != "participants")
-        rows = (row for page in pages for row in build(choice.slug, page))
-        yield f"{table}.csv", manifest.pieces(f"{table}.csv", rows)
-    yield "codebook.csv", manifest.pieces("codebook.csv", codebook.rows())
-    manifest.content |= {
-        "study": choice.slug,
-        "study_versions": [{k: row[k] for k in ("number", "sha256", "launched_utc")} for row in versions],
-        "modes": list(choice.modes),
-        "practice": choice.practice,
-        "exported_utc": canonical.utc_text(moment),
-        "hatlab": version("hatlab"),
-    }
-    yield "manifest.json", iter([json.dumps(manifest.content, indent=2, ensure_ascii=False).encode() + b"\n"])
-
-
-def _pages(
-    db: DbSession, choice: Choice, left: Callable[[tidy.Row], bool], *, with_events: bool
-) -> Iterator[_Page]:
-    after = ""
-    while people := exports.participant_page(db, choice.study_id, choice.modes, after, PEOPLE_A_PAGE):
-        after = people[-1]["id"]
-        stories = tuple(_stories(db, [p["id"] for p in people], choice.phases)) if with_events else ()
-        yield _Page({p["id"]: p for p in people}, frozenset(p["id"] for p in people if left(p)), stories)
+    def manifest(self, sheets: Sequence[Sheet]) -> dict[str, Any]:
+        """Say what the files are, once they have gone out."""
+        versions = [{key: row[key] for key in ("number", "sha256", "launched_utc")} for row in self._versions]
+        return {
+            "study": self._choice.slug,
+            "study_versions": versions,
+            "modes": list(self._choice.modes),
+            "practice": self._choice.practice,
+            "exported_utc": canonical.utc_text(self._moment),
+            "hatlab": version("hatlab"),
+            "files": {sheet.name: sheet.facts for sheet in sheets},
+        }
 
 
 def _stories(db: DbSession, people: Sequence[str], phases: Sequence[str]) -> Iterator[tidy.Story]:

@@ -246,7 +246,7 @@ def test_memory_does_not_grow_with_the_number_of_people(
 ) -> None:
     lab = prepared(sqlite_database)
     monkeypatch.setattr("server.services.export.PEOPLE_A_PAGE", 2)
-    monkeypatch.setattr("server.services.export.ROWS_A_PIECE", 100)
+    monkeypatch.setattr("server.services.sheets.ROWS_A_PIECE", 100)
 
     def peak_bytes() -> int:
         tracemalloc.start()

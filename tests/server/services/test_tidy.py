@@ -13,7 +13,7 @@ from benchmarks import synthetic
 from server.domain.participation import Round
 from server.domain.study import read
 from server.services import codebook, studies, tidy, tracks
-from server.services.export import csv_pieces
+from server.services.sheets import Sheet
 
 STEP, TRIAL, AGENT = (codebook.header(table) for table in ("steps", "trials", "agents"))
 PERSON = {"id": "PA", "study_version": 2, "mode": "live", "arm": "one-hot"}
@@ -248,7 +248,7 @@ def test_permutations_are_written_as_numbers_between_spaces() -> None:
 
 
 def cells(table: str, *rows: tuple[Any, ...]) -> list[list[str]]:
-    text = b"".join(piece for _, piece in csv_pieces(table, rows)).decode()
+    text = b"".join(Sheet(table).pieces(rows)).decode()
     assert text.endswith("\r\n")
     return list(csv.reader(io.StringIO(text, newline="")))
 
