@@ -2,8 +2,8 @@
 
 Memory does not grow with the study: people are read a page at a time, and a table leaves in pieces. One
 reading transaction spans all tables, so that they belong together. A folder gets its tables side by side; a
-zip holds one file after the other, so that its people are read once for each. The manifest is written last: an
-export without one was interrupted. What the columns mean stands in `server.services.codebook`.
+zip holds one file after the other, so that its people are read once for each. The manifest is written last:
+an export without one was interrupted. What the columns mean stands in `server.services.codebook`.
 """
 
 import io
