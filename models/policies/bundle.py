@@ -41,6 +41,7 @@ MANIFEST, WEIGHTS, LEXICON, EVALUATION, CARD = (
 )
 HASHED = (WEIGHTS, LEXICON, EVALUATION, CARD)
 SIZE_MAX = 4096  # a manifest may not make the loader allocate without limit
+BYTES_MAX = 256 * 2**20  # of one file: a link to a device, or a wrong file, must not fill the memory
 NAME = re.compile(r"[a-z0-9_]+/[a-z0-9-]+")
 
 
@@ -188,8 +189,13 @@ def _json_bytes(data: Mapping[str, Any], indent: int | None = 2) -> bytes:
 
 
 def _read(folder: Path, name: str) -> bytes:
+    path = folder / name
     try:
-        return (folder / name).read_bytes()
+        if path.exists() and not path.is_file():
+            raise BundleError(f"{name}: not a file")  # reading a pipe or a device would never end
+        if path.stat().st_size > BYTES_MAX:
+            raise BundleError(f"{name}: larger than {BYTES_MAX} bytes")
+        return path.read_bytes()
     except FileNotFoundError:
         raise BundleError(f"{name}: missing; copy the whole bundle folder again") from None
     except OSError as error:
@@ -199,7 +205,8 @@ def _read(folder: Path, name: str) -> bytes:
 def _object(name: str, raw: bytes) -> dict[str, Any]:
     try:
         data = json.loads(raw)
-    except ValueError:
+        json.dumps(data, ensure_ascii=False).encode()  # a lone surrogate cannot be shown on any page
+    except (ValueError, RecursionError):
         raise BundleError(f"{name}: not JSON") from None
     if not isinstance(data, dict):
         raise BundleError(f"{name}: not a JSON object")
@@ -306,6 +313,8 @@ def _lexicon(manifest: Manifest, raw: bytes) -> Lexicon:
         lexicon = Lexicon.from_json(_object(LEXICON, raw))
     except LexiconError as error:
         raise BundleError(f"{LEXICON}: {error}") from None
+    except (TypeError, ValueError, KeyError, OverflowError) as error:
+        raise BundleError(f"{LEXICON}: a value of the wrong type ({_line(error)})") from None
     wanted = manifest.sizes["tokens"], registry.make(manifest.task).cells
     if (lexicon.tokens, lexicon.cells) != wanted:
         found = lexicon.tokens, lexicon.cells

@@ -1,4 +1,5 @@
 import json
+import os
 import pickle
 import shutil
 from pathlib import Path
@@ -205,3 +206,38 @@ def test_find_loads_what_it_can_and_says_what_it_could_not(tmp_path: Path) -> No
 
 def test_find_of_a_folder_that_does_not_exist_is_empty(tmp_path: Path) -> None:
     assert find(tmp_path / "nowhere") == ({}, ())
+
+
+@pytest.mark.parametrize("name", [bundles.MANIFEST, bundles.LEXICON, bundles.EVALUATION])
+@pytest.mark.parametrize("content", [b"[" * 200_000, b'{"a":' * 200_000, b'{"a": "\\ud800"}'])
+def test_json_that_no_reader_survives_is_refused(folder: Path, name: str, content: bytes) -> None:
+    if name == bundles.MANIFEST:
+        (folder / name).write_bytes(content)
+    else:
+        replace_file(folder, name, content)
+    assert refusal(folder) == f"{name}: not JSON"
+
+
+@pytest.mark.parametrize("value", [None, True, 5, "x", {}, [None], [[True, None]]])
+@pytest.mark.parametrize("field", ["probability", "uses", "entropy_bits", "null", "positions", "coordinates"])
+def test_a_lexicon_of_wrong_types_is_refused_in_one_line(folder: Path, field: str, value: object) -> None:
+    lexicon = json.loads((folder / bundles.LEXICON).read_text())
+    replace_file(folder, bundles.LEXICON, json.dumps(lexicon | {field: value}).encode())
+    assert refusal(folder).startswith(f"{bundles.LEXICON}: ")
+
+
+def test_a_pipe_in_place_of_a_file_does_not_hold_the_server_up(folder: Path) -> None:
+    (folder / bundles.CARD).unlink()
+    os.mkfifo(folder / bundles.CARD)
+    assert refusal(folder) == f"{bundles.CARD}: not a file"
+
+
+def test_a_device_in_place_of_a_file_is_not_read(folder: Path) -> None:
+    (folder / bundles.MANIFEST).unlink()
+    (folder / bundles.MANIFEST).symlink_to("/dev/zero")
+    assert refusal(folder) == f"{bundles.MANIFEST}: not a file"
+
+
+def test_a_file_that_would_fill_the_memory_is_not_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bundles, "BYTES_MAX", 10)
+    assert refusal(folder) == f"{bundles.MANIFEST}: larger than 10 bytes"
