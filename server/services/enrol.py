@@ -47,6 +47,8 @@ VISIT = "visit"
 A random name for one visit to the entry page, so that a form sent twice makes one person.
 """
 VISIT_BYTES = 16
+TEXT = "consent_text"
+"""Hidden field: the hash of the text that was read. What is stored as agreed to is what stood there."""
 ROBOT_SIGNATURE_MAX_S = 3_600
 DEVICES = ("desktop", "tablet", "phone")
 UNKNOWN = "unknown"
@@ -117,7 +119,7 @@ def entry(db: DbSession, lab: Lab, slug: str, params: Mapping[str, str], robot: 
         return Entry("not_found")
     if known := known_key(db, lab, visit):
         return Entry("resume", visit.study, known)
-    return Entry(kind_of(db, lab, visit), visit.study, identifiers=identifiers_of(visit.arrival))
+    return Entry(kind_of(db, lab, visit), visit.study, identifiers=identifiers_of(visit))
 
 
 def consent(
@@ -132,7 +134,8 @@ def consent(
 ) -> Enrolled | Declined | Entry:
     """End consent: take the person in and draw the arm, or keep nothing.
 
-    An `Entry` comes back where the study cannot take the person after all.
+    An `Entry` comes back where the study cannot take the person after all, and (of kind `consent`) where a
+    new version has another text than the one that was read.
 
     Raises:
         NotFoundError: no such study.
@@ -150,6 +153,8 @@ def consent(
         return Enrolled(known)
     if (kind := kind_of(db, lab, visit)) != "consent":
         return Entry(kind, visit.study)
+    if params.get(TEXT, visit.study.consent_sha256) != visit.study.consent_sha256:
+        return Entry("consent", visit.study, identifiers=identifiers_of(visit))
     return enrol(db, lab, visit, device)
 
 
@@ -205,10 +210,11 @@ def is_visit(text: str) -> bool:
         return False
 
 
-def identifiers_of(arrival: Arrival) -> dict[str, str]:
+def identifiers_of(visit: Visit) -> dict[str, str]:
+    arrival, read = visit.arrival, {TEXT: visit.study.consent_sha256}
     if arrival.external_id is not None and arrival.parameters:
-        return dict(arrival.parameters)
-    return {VISIT: secrets.token_urlsafe(VISIT_BYTES)}
+        return {**arrival.parameters, **read}
+    return {VISIT: secrets.token_urlsafe(VISIT_BYTES), **read}
 
 
 def known_key(db: DbSession, lab: Lab, visit: Visit) -> str | None:

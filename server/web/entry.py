@@ -28,6 +28,7 @@ router = APIRouter()
 SLUG = re.compile(r"[a-z0-9-]{1,64}")
 PLAIN = re.compile(r"[^\x00-\x1f\x7f]{0,500}")  # a control character in a value is nobody's typing
 COOKIE_S = 30 * 86_400
+TEXT_CHANGED = "The text of this page was changed while you had it open. Please read it again."
 TICK_FIRST = "Please tick the box first: it says that you have read this page and agree."
 Robot = Annotated[str | None, Header(alias="X-Hatlab-Robot", max_length=500)]
 
@@ -72,7 +73,7 @@ def give_consent(
     if isinstance(done, Declined):
         said = messages.declined(done.study.title, done.study.texts.declined)
         return html(said, frames=frames(params))
-    return page_of_entry(done, slug, params)
+    return consent_again(done, slug, params, TEXT_CHANGED)
 
 
 def into_session(request: Request, lab: Lab, slug: str, params: Mapping[str, str], key: str) -> Response:
@@ -104,13 +105,19 @@ def remembered(request: Request, lab: Lab, slug: str, params: Mapping[str, str])
 
 
 def unticked(lab: Lab, slug: str, params: Mapping[str, str], robot: str | None) -> Response:
-    """The consent page again, with what is missing; the visit keeps its name."""
+    """The consent page again, with what is missing."""
     with lab.database.reading() as db:
         found = enrol.entry(db, lab, slug, params, robot)
+    return consent_again(found, slug, params, TICK_FIRST)
+
+
+def consent_again(found: Entry, slug: str, params: Mapping[str, str], why: str) -> Response:
+    """Say why consent is asked for once more, if it still is; the visit keeps its name."""
     if found.kind != "consent":
         return page_of_entry(found, slug, params)
     kept = {name: params.get(name, value) for name, value in found.identifiers.items()}
-    return html(consent_page(found, slug, kept, TICK_FIRST), 422, frames=frames(params))
+    kept[enrol.TEXT] = found.identifiers[enrol.TEXT]
+    return html(consent_page(found, slug, kept, why), 422, frames=frames(params))
 
 
 def page_of_entry(found: Entry, slug: str, params: Mapping[str, str]) -> Response:

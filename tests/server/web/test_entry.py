@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from server.services.lab import Lab
-from server.storage import participants, studies
+from server.storage import enrolments, participants, studies
 from server.storage.database import Database
 from tests.fakes import definition, fake_lab
 from tests.server.services.steps import launch
@@ -186,3 +186,72 @@ def test_a_robot_needs_the_servers_signature(lab: Lab) -> None:
     late = client.post(f"/s/{SLUG}/consent", data={**prolific(), **YES}, headers=headers)
     assert late.status_code == 422
     assert people(lab) == 0
+
+
+def launch_again(lab: Lab, **changes: Any) -> None:
+    """Another version, while somebody has the consent page of the first one open."""
+    newer = definition(SLUG, **changes)
+    with lab.database.writing() as db:
+        row = studies.by_slug(db, SLUG)
+        assert row is not None
+        studies.add_version(db, row.id, newer.canonical, newer.sha256, lab.now_utc())
+
+
+def test_nobody_agrees_to_a_text_that_was_changed_while_it_was_read(lab: Lab) -> None:
+    client = open_study(lab)
+    first = hidden_fields(client.get(f"/s/{SLUG}", params=prolific()).text)
+    texts = definition(SLUG).model_dump(mode="json")["texts"]
+    launch_again(lab, texts={**texts, "consent": ["Risk: something else now."]})
+    again = client.post(f"/s/{SLUG}/consent", data={**first, **YES})
+    assert again.status_code == 422
+    assert "was changed while you had it open" in again.text
+    assert "Something else now." in again.text
+    assert people(lab) == 0
+    second = hidden_fields(again.text)
+    assert second.items() >= prolific().items()
+    assert client.post(f"/s/{SLUG}/consent", data={**second, **YES}).status_code == 303
+    with lab.database.reading() as db:
+        (row,) = participants.stream(db)
+        agreed = enrolments.consent_of(db, row.id)
+    assert agreed.text_sha256 == second["consent_text"] != first["consent_text"]
+
+
+def test_a_new_version_with_the_same_text_troubles_nobody(lab: Lab) -> None:
+    client = open_study(lab)
+    first = hidden_fields(client.get(f"/s/{SLUG}").text)
+    launch_again(lab, duration_min=33)
+    assert client.post(f"/s/{SLUG}/consent", data={**first, **YES}).status_code == 303
+
+
+def test_a_missing_tick_after_a_change_of_the_text_shows_the_new_one_with_its_hash(lab: Lab) -> None:
+    client = open_study(lab)
+    first = hidden_fields(client.get(f"/s/{SLUG}").text)
+    texts = definition(SLUG).model_dump(mode="json")["texts"]
+    launch_again(lab, texts={**texts, "consent": ["Risk: something else now."]})
+    unticked = hidden_fields(client.post(f"/s/{SLUG}/consent", data={**first, "agree": "yes"}).text)
+    assert unticked["visit"] == first["visit"]
+    assert unticked["consent_text"] != first["consent_text"]
+
+
+def multipart(charset: str, **fields: bytes) -> dict[str, Any]:
+    parts = [
+        b'--b\r\nContent-Disposition: form-data; name="%s"\r\n\r\n%s\r\n' % (n.encode(), v)
+        for n, v in fields.items()
+    ]
+    kind = f"multipart/form-data; boundary=b; charset={charset}"
+    return {"content": b"".join((*parts, b"--b--\r\n")), "headers": {"content-type": kind}}
+
+
+@pytest.mark.parametrize("charset", ["unicode_escape", "raw_unicode_escape", "undefined", "punycode"])
+def test_a_charset_that_makes_no_text_is_refused_and_is_no_incident(lab: Lab, charset: str) -> None:
+    fields = {**prolific(), "agree": "yes", "read": "yes", "browser": "\\ud800 x"}
+    sent = multipart(charset, **{name: value.encode() for name, value in fields.items()})
+    refused = open_study(lab).post(f"/s/{SLUG}/consent", **sent)
+    assert refused.status_code == 400
+    assert "Incident" not in refused.text
+    assert people(lab) == 0
+
+
+def test_a_null_character_in_a_form_is_refused_for_postgresql_cannot_store_it(lab: Lab) -> None:
+    client = open_study(lab)
+    assert client.post("/admin/login", data={"username": "a\0b", "password": "x"}).status_code == 400
