@@ -72,6 +72,8 @@ class SharedWriter:
             self._commit(connection)
         if keep:
             shared.result()
+        else:
+            shared.over.wait()  # what was read in this turn may be another's, and not durable before
 
     def close(self) -> None:
         if self._connection is not None:
