@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Mapping
+from itertools import count
 from typing import Any
 
 from pydantic_core import PydanticUndefined
@@ -128,10 +129,10 @@ def with_arms_changed(values: dict[str, Any], action: str) -> dict[str, Any]:
     arms = list(values["arms"])
     if action == "add-arm":
         taken = {arm["name"] for arm in arms}
-        number = next(n for n in range(len(arms) + 1, 99) if f"arm-{n}" not in taken)
+        number = next(n for n in count(len(arms) + 1) if f"arm-{n}" not in taken)
         like = arms[-1] if arms else {"communication": "prototype", "bundle": "", "budget": "1", "places": ""}
         arms.append({**like, "overlay": True, "name": f"arm-{number}"})
-    elif action.startswith("remove-arm-") and action.removeprefix("remove-arm-").isdigit():
+    elif action.startswith("remove-arm-") and action.removeprefix("remove-arm-").isdecimal():
         gone = int(action.removeprefix("remove-arm-"))
         arms = [arm for index, arm in enumerate(arms) if index != gone]
     return {**values, "arms": arms}

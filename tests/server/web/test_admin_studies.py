@@ -219,6 +219,19 @@ def test_arms_are_added_and_removed_without_losing_what_was_typed(person: Experi
     ]
 
 
+@pytest.mark.parametrize(
+    "action", ["remove-arm-²", "remove-arm-999999999999", "remove-arm-", "remove-arm--1"]
+)
+def test_an_arm_that_is_not_there_cannot_be_removed(person: Experimenter, draft: str, action: str) -> None:
+    assert person.save(draft, action=action).status_code == 303
+    assert len(study(person.lab, draft).values["arms"]) == 3
+
+
+def test_however_many_arms_were_typed_one_more_is_only_one_too_many(person: Experimenter, draft: str) -> None:
+    person.save(draft, {f"arms.{n}.name": f"a{n}" for n in range(100)}, action="add-arm")
+    assert len(study(person.lab, draft).values["arms"]) == 101
+
+
 def test_launching_asks_then_freezes_the_version_and_opens_the_study(
     person: Experimenter, draft: str
 ) -> None:
