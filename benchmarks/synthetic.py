@@ -87,7 +87,7 @@ def play(spec: TrialSpec, planned: Round, random: Random) -> Played:
     """Play a trial at random, from its first event to its last."""
     stopwatch = Stopwatch(str(random.random()), planned.round)
     now = said(trial.start(spec), random)
-    bodies = [events.start_body(spec, now.said, saw(now), STORED_UTC)]
+    bodies = [events.start_body("synthetic", "live", spec, now.said, saw(now), STORED_UTC)]
     while not now.over:
         action = random.choice(now.choices)
         token = PANEL.token_of(action) if spec.role == "child" else None

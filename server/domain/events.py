@@ -1,9 +1,9 @@
 """Events of a trial: their bodies, what may stand in them, and the digests that chain them.
 
-Event 0 `start`: the spec and what was said and shown first. Event n >= 1 `decision`: the person's action and
-timing; the world steps that it caused, each with every seat's action; after each step every seat's token and
-gate in the new state; and what the answer showed, as numbers (`saw`). `stored_utc` stands in the body too, so
-that the digest covers it.
+Event 0 `start`: whose trial it is (its id and the participant's mode), the spec, and what was said and
+shown first. Event n >= 1 `decision`: the person's action and timing; the world steps that it caused, each
+with every seat's action; after each step every seat's token and gate in the new state; and what the answer
+showed, as numbers (`saw`). `stored_utc` stands in the body too, so that the digest covers it.
 """
 
 import math
@@ -59,9 +59,11 @@ def silence(agents: int) -> Said:
     return Said((SILENT,) * agents, (False,) * agents)
 
 
-def start_body(spec: TrialSpec, said: Said, saw: Saw, stored_utc: str) -> Body:
+def start_body(trial_id: str, mode: str, spec: TrialSpec, said: Said, saw: Saw, stored_utc: str) -> Body:
     return {
         "kind": "start",
+        "trial": trial_id,
+        "mode": mode,
         "spec": spec.model_dump(mode="json"),
         "tokens": list(said.tokens),
         "gates": list(said.gates),

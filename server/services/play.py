@@ -79,9 +79,11 @@ def begin_round(db: DbSession, lab: Lab, session: Session, planned: Round) -> Tr
     running, said = fold.begin(lab, spec)
     running = replace(running, trial=trial.spoken(running.trial, said))
     heard, now_utc = running.heard, lab.now_utc()
-    body = canonical.dumps(events.start_body(spec, said, saw(running.trial, heard), now_utc))
+    trial_id = f"{participant.id}-{planned.round:03d}"
+    start = events.start_body(trial_id, participant.mode, spec, said, saw(running.trial, heard), now_utc)
+    body = canonical.dumps(start)
     row = TrialRow(
-        id=f"{participant.id}-{planned.round:03d}",
+        id=trial_id,
         participant_id=participant.id,
         round=planned.round,
         phase=planned.phase,

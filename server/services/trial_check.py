@@ -52,6 +52,7 @@ def check(
         bodies = parsed(stored)
         spec = expected_spec(lab, session, row)
         after = replayed(lab, spec, stored, bodies)
+        check_mode(session, bodies[0])
         check_row(expected_row(session, spec, after, stored, row), row)
         if audit is not None:
             decide_again(lab, spec, bodies, audit)
@@ -60,6 +61,12 @@ def check(
     except Exception as error:  # noqa: BLE001 (a row may hold anything; the others are still to be checked)
         return f"{row.id} cannot be replayed: {said_of(error)}"
     return None
+
+
+def check_mode(session: Session, start: Body) -> None:
+    """Data of a robot or a test stay what they were when the trial began."""
+    if (mode := start["mode"]) != session.participant.mode:
+        raise DifferenceError(f"seq 0: mode stored {mode}, the participant has {session.participant.mode}")
 
 
 def parsed(stored: Sequence[EventRow]) -> list[Body]:
@@ -97,10 +104,10 @@ def replayed(lab: Lab, spec: TrialSpec, stored: Sequence[EventRow], bodies: Sequ
         try:
             at = started(at, body) if seq == 0 else decided(at, body)
             check_tokens(at, body, lexicon)
+            seen = saw(at, translate(at, lexicon))
+            again = rebuilt(body, event, seen.to_dict(), spec if seq == 0 else None)
         except (CorruptError, KeyError, TypeError, IndexError, AttributeError, ValueError) as error:
             raise DifferenceError(f"seq {seq}: {said_of(error)}") from error
-        seen = saw(at, translate(at, lexicon))
-        again = rebuilt(body, event, seen.to_dict(), spec if seq == 0 else None)
         for found in differences(body, again):
             raise DifferenceError(f"seq {seq}: {found}")
         digest = events.digest(digest, event.body)
@@ -147,7 +154,8 @@ def rebuilt(body: Body, event: EventRow, seen: Mapping[str, Any], spec: TrialSpe
     again = {"saw": dict(seen), "stored_utc": event.stored_utc}
     if spec is not None:
         said = {"tokens": list(body["tokens"]), "gates": list(body["gates"])}
-        return {"kind": "start", "spec": spec.model_dump(mode="json"), **said, **again}
+        whose = {"trial": event.trial_id, "mode": body["mode"]}
+        return {"kind": "start", **whose, "spec": spec.model_dump(mode="json"), **said, **again}
     moves = [{name: list(move[name]) for name in ("actions", "tokens", "gates")} for move in body["moves"]]
     kept = {name: body[name] for name in ("action", "token", "timing")}
     return {"kind": "decision", **kept, "moves": moves, **again}

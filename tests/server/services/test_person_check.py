@@ -3,7 +3,7 @@
 from typing import Any
 
 import pytest
-from sqlalchemy import delete, select, text, update
+from sqlalchemy import delete, insert, select, text, update
 
 from server.domain import canonical
 from server.services.lab import Lab
@@ -58,8 +58,8 @@ def ada(lab: Lab) -> str:
         ("device", "phone", "allocation.cell stored"),
         ("marketplace", "direct", "identity is of another"),
         ("key_sha256", "0", "key_sha256"),
-        ("token_permutation", "x", "cannot be replayed"),
-        ("number_permutation", "[1]", "cannot be replayed"),
+        ("token_permutation", "x", "token_permutation stored x"),
+        ("number_permutation", "[1]", "number_permutation stored [1]"),
         ("arm", "nobody", "allocation: stored nobody"),
         ("page", "zzz", "page stored 'zzz'"),
     ],
@@ -185,3 +185,35 @@ def test_an_unfinished_person_without_rounds_is_in_order(sqlite_database: Databa
     key = playing(lab, SLUG)
     assert person(lab, key).page == "play:1"
     assert verify(lab).clean
+
+
+def test_a_test_that_is_made_live_afterwards_is_found(lab: Lab) -> None:
+    """Robots and tests become data by one changed word; the start of every trial says what it was."""
+    who = ada(lab)
+    found = found_after(lab, update(participant).where(participant.c.id == who).values(mode="robot"))
+    assert found
+    assert all(line.startswith(who) and "mode stored live" in line for line in found), found
+
+
+def test_a_trial_passed_off_as_somebody_elses_is_found(sqlite_database: Database) -> None:
+    """Two drivers of one arm who met the same situation: nothing but the log's own name tells them apart."""
+    lab = fake_lab(sqlite_database)
+    arms = [{"name": "one", "bundle": "traffic_junction/budget-100", "places": 9}]
+    play_all(lab, playing(lab, "traffic-junction", "ada", trials_per_block=1, arms=arms))
+    play_all(lab, come_in(lab, "traffic-junction", "bob"))
+    with lab.database.reading() as db:
+        first, second = sorted(db.read(select(trial.c.id).where(trial.c.phase == "main")).scalars())
+        rows = {
+            name: db.read(select(event).where(event.c.trial_id == name).order_by(event.c.seq))
+            .mappings()
+            .all()
+            for name in (first, second)
+        }
+        row = db.read(select(trial).where(trial.c.id == second)).mappings().one()
+    kept = ("last_seq", "digest", "outcome", "steps", "progress", "started_utc", "ended_utc")
+    with lab.database.writing() as db:
+        db.write(delete(event).where(event.c.trial_id == first))
+        db.write(insert(event), [{**one, "trial_id": first} for one in rows[second]])
+        db.write(update(trial).where(trial.c.id == first).values({name: row[name] for name in kept}))
+    (found,) = verify(lab).differences
+    assert found.startswith(f"{first} seq 0: trial stored {second}")
