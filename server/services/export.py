@@ -107,7 +107,7 @@ def stream_zip(lab: Lab, slug: str, modes: Sequence[str], *, practice: bool = Fa
 
 def choose(db: DbSession, slug: str, modes: Sequence[str], *, practice: bool = False) -> Choice:
     """Check what was asked for; no mode at all means live."""
-    study = exports.study_row(db, slug)
+    study = exports.study_row(db, slug) if slug.isprintable() else None
     if study is None:
         raise NotFoundError(f"no study is called {slug}")
     if unknown := sorted(set(modes) - set(MODES)):

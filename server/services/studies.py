@@ -102,7 +102,7 @@ def find(db: DbSession, slug: str) -> Study:
     Raises:
         NotFoundError: there is none.
     """
-    row = studies.by_slug(db, slug)
+    row = studies.by_slug(db, slug) if slug.isprintable() else None  # PostgreSQL takes no null character
     if row is None:
         raise NotFoundError(f"there is no study {slug!r}")
     return study_of(db, row)
