@@ -158,6 +158,18 @@ def consent(
     return enrol(db, lab, visit, device)
 
 
+def come_back(db: DbSession, lab: Lab, key: str, params: Mapping[str, str]) -> None:
+    """Keep the submission under which somebody came back, while there is something left to do.
+
+    Who returned a task and took it again must end the new one: MTurk takes no form for the old assignment.
+    """
+    participant, arrival = participant_by_key(db, lab, key), arrival_of(params)
+    known = enrolments.identity_of(db, participant.id)
+    if participant.status == "active" and arrival.submission_id not in {None, known.submission_id}:
+        parameters = canonical.dumps(dict(arrival.parameters))
+        enrolments.renew(db, participant.id, arrival.submission_id or "", parameters)
+
+
 def participant_by_key(db: DbSession, lab: Lab, key: str) -> ParticipantRow:  # noqa: ARG001
     """The participant whose address this is.
 

@@ -5,7 +5,7 @@ Who the marketplace says it is, what was agreed to, how the arm was drawn.
 
 from typing import NamedTuple
 
-from sqlalchemy import insert, select
+from sqlalchemy import insert, select, update
 
 from server.storage.database import DbSession
 from server.storage.tables import allocation, consent, identity
@@ -59,6 +59,12 @@ def identity_of(db: DbSession, participant_id: str) -> IdentityRow:
     return IdentityRow._make(
         db.read(select(identity).where(identity.c.participant_id == participant_id)).one()
     )
+
+
+def renew(db: DbSession, participant_id: str, submission_id: str, parameters: str) -> None:
+    """Another sitting of the same person at the marketplace."""
+    statement = update(identity).where(identity.c.participant_id == participant_id)
+    db.write(statement.values(submission_id=submission_id, parameters=parameters))
 
 
 def consent_of(db: DbSession, participant_id: str) -> ConsentRow:

@@ -47,6 +47,9 @@ def entry_page(request: Request, lab: CurrentLab, slug: str, robot: Robot = None
         return html(messages.unknown_study(), 404)
     with lab.database.reading() as db:
         found = enrol.entry(db, lab, slug, params, robot)
+    if found.key is not None:
+        with lab.database.writing() as db:
+            enrol.come_back(db, lab, found.key, params)
     if found.kind == "consent" and (key := remembered(request, lab, slug, params)):
         return RedirectResponse(f"/p/{key}", 303)
     return page_of_entry(found, slug, params)

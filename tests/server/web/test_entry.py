@@ -11,7 +11,7 @@ from server.storage.database import Database
 from tests.fakes import definition, fake_lab
 from tests.server.services.steps import launch
 from tests.server.web.client import Client
-from tests.server.web.walk import DEVICE, YES, client_of, come_in, hidden_fields, mturk, prolific
+from tests.server.web.walk import DEVICE, YES, client_of, come_in, hidden_fields, mturk, play_all, prolific
 
 SLUG = "traffic-junction"
 
@@ -255,3 +255,14 @@ def test_a_charset_that_makes_no_text_is_refused_and_is_no_incident(lab: Lab, ch
 def test_a_null_character_in_a_form_is_refused_for_postgresql_cannot_store_it(lab: Lab) -> None:
     client = open_study(lab)
     assert client.post("/admin/login", data={"username": "a\0b", "password": "x"}).status_code == 400
+
+
+def test_who_took_the_task_again_submits_the_new_assignment(lab: Lab) -> None:
+    client = open_study(lab, trials_per_block=1)
+    address = come_in(client, SLUG, mturk(assignment="returned"))
+    again = client.get(f"/s/{SLUG}", params=mturk(assignment="taken-again"))
+    assert again.headers["location"] == address
+    assert hidden_fields(play_all(client, address).text)["assignmentId"] == "taken-again"
+    client.get(f"/s/{SLUG}", params=mturk(assignment="a-third"))
+    assert hidden_fields(client.get(address).text)["assignmentId"] == "taken-again"
+    assert people(lab) == 1
