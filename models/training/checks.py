@@ -3,6 +3,8 @@
 from typing import Any, NamedTuple
 
 import numpy as np
+import torch
+from torch import nn
 
 from models import rollout
 from models.envs.api import Environment
@@ -13,6 +15,8 @@ from models.training.situations import check_seeds
 
 OVER_BUDGET = 2.0  # score lost per message rate above budget + tolerance
 TOLERANCE = 0.01
+HALVINGS = 6  # of the interval in which the gate's threshold is looked for: to 6 / 2**6 = .1 in the logit
+REACH = 3.0  # largest move of the threshold, in the logit
 
 
 class Checked(NamedTuple):
@@ -54,3 +58,30 @@ def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Chec
         score -= OVER_BUDGET * sum(max(0.0, rate - phase.budget - TOLERANCE) for rate in rates)
     used = len(np.unique(played.tokens[played.gates]))
     return Checked(success, human, arrived, steps, rates[0], human_rate, used, score)
+
+
+@torch.no_grad()
+def calibrate(env: Environment[Any], net: RecurrentNet, budget: float, settings: Check) -> None:
+    """Move the gate's threshold, in place, so that greedy gates send what drawn gates learned to send.
+
+    Where a gate is open with probability .4 it is drawn open two times in five, but greedily never. The most
+    talkative threshold is taken at which neither episodes from ``init`` nor human trials exceed the budget.
+    """
+    gate = net.gate
+    assert isinstance(gate, nn.Linear)
+    before = gate.bias.clone()
+    low, high = -REACH, REACH
+    for _ in range(HALVINGS):
+        middle = (low + high) / 2
+        gate.bias.copy_(before + middle)
+        low, high = (middle, high) if _rate(env, net, settings) <= budget else (low, middle)
+    gate.bias.copy_(before + low)
+
+
+def _rate(env: Environment[Any], net: RecurrentNet, settings: Check) -> float:
+    """The larger message rate of episodes from ``init`` and of human trials."""
+    team = Team(env, RecurrentPolicy(net))
+    rates = [rollout.episodes(env, team, check_seeds(settings.episodes)).message_rate]
+    if settings.human:
+        rates.append(rollout.episodes(env, team, check_seeds(settings.human), "human").message_rate)
+    return max(rates)

@@ -110,6 +110,8 @@ class Phase(_Strict):
     """Imitation: steps of the world between gradient steps, the memory carried over; 0 is the whole
     episode.
     """
+    first_step: bool = False
+    """Only the first step of each episode is played: all there is to learn about messages that are held."""
     lr: Annotated[float, Field(gt=0)] = 1e-3
     """Learning rate of Adam at the start."""
     lr_end: Annotated[float, Field(gt=0)] | None = None
@@ -124,7 +126,8 @@ class Phase(_Strict):
     """Updates between revivals of unused prototypes; 0 for never."""
     gate: Literal["open", "learned", "rewarded", "enforced", "budget"] = "open"
     """open: always sent; learned: unconstrained; rewarded: penalty on silence; enforced: the Enforcer's
-    penalty on the reward; budget: differentiable loss on each agent's mean gate."""
+    penalty on the reward; budget: differentiable loss on the mean gate; if gates are drawn, greedy
+    ones get a threshold that meets the budget too."""
     budget: Annotated[float, Field(gt=0, le=1)] | None = None
     """Share of messages to be sent (enforced and budget)."""
     gate_weight: Weight = 1.0

@@ -5,6 +5,7 @@ check). Killed at any moment, it goes on from its last check and ends with the s
 machine.
 """
 
+import copy
 import csv
 import hashlib
 import json
@@ -23,7 +24,7 @@ from models.policies import bundle
 from models.policies.channels import PrototypeChannel
 from models.policies.recurrent import Architecture, RecurrentNet, RecurrentPolicy
 from models.training import checkpoint
-from models.training.checks import Checked, check
+from models.training.checks import Checked, calibrate, check
 from models.training.config import Phase, Recipe
 from models.training.curriculum import Progress, between, same_regime
 from models.training.enforcer import Enforcer
@@ -169,7 +170,7 @@ class Trainer:
 
     def _windows(self, phase: Phase, update: int) -> Iterator[tuple[Unrolled, NDArray[np.int64] | None]]:
         """Play the episodes of one update, window by window, with the rule's actions (M,) if wanted."""
-        recipe, steps_max = self.recipe, self.env.steps_max
+        recipe, steps_max = self.recipe, 1 if phase.first_step else self.env.steps_max
         manner = Manner(phase.discrete, phase.sampled, phase.explore, phase.gate == "open")
         draws = generator(recipe.seed, update)
         begin = beginning(
@@ -206,11 +207,12 @@ class Trainer:
     def _check(self) -> None:
         """Evaluate, keep the best, log, move on to the next phase if it is time, and write the checkpoint."""
         phase = self.phase
-        checked = check(self.env, self.learner.net, phase, self.recipe.check)
+        net = self._judged()
+        checked = check(self.env, net, phase, self.recipe.check)
         better = checked.score > self.best_score
         if better:
             self.best_score = checked.score
-            self.best = {name: value.clone() for name, value in self.learner.net.state_dict().items()}
+            self.best = {name: value.clone() for name, value in net.state_dict().items()}
         self._log(checked, better)
         self.status = (
             f"{self.recipe.name} {phase.name}: success {checked.success:.3f}, score {checked.score:.3f}"
@@ -224,6 +226,15 @@ class Trainer:
                 self.at = self.at.next_phase()
                 self._enter()
         self._save()
+
+    def _judged(self) -> RecurrentNet:
+        """The policy as people would meet it; drawn gates held at a budget get their greedy threshold."""
+        phase = self.phase
+        if phase.gate != "budget" or phase.budget is None or not phase.sampled:
+            return self.learner.net
+        net = copy.deepcopy(self.learner.net)
+        calibrate(self.env, net, phase.budget, self.recipe.check)
+        return net
 
     def _log(self, checked: Checked, better: bool) -> None:
         phase, at = self.phase, self.at
