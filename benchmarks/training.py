@@ -21,7 +21,7 @@ from models.training.config import Recipe, parse
 from models.training.run import PACKAGED
 from models.training.trainer import Trainer
 
-EPISODES = 200
+EPISODES = 400
 
 
 class Case(NamedTuple):
