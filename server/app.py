@@ -1,5 +1,8 @@
 """The one composition root: settings, database and bundles in, an ASGI application out."""
 
+import multiprocessing
+import os
+import re
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
@@ -56,10 +59,25 @@ def from_environment() -> FastAPI:
     """
     log_as_json()
     torch.set_num_threads(1)  # one decision is too small to share; workers are what share the load
+    stay_on_one_core()
     lab = Lab.open(Settings())
     for error in lab.bundle_errors:
         print(f"hatlab: agent left out: {error}", file=sys.stderr)
     return create_app(lab)
+
+
+def stay_on_one_core() -> None:
+    """Keep the threads of a worker together, each worker on the next core.
+
+    Python runs one of them at a time in any case; passing the turn from core to core costs more than the work
+    itself (measured: 3.6 ms CPU a step with 40 threads on two cores, 1.3 ms on one).
+    """
+    if not hasattr(os, "sched_setaffinity"):
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    number = re.search(r"\d+$", multiprocessing.current_process().name)  # uvicorn's: SpawnProcess-1, -2, …
+    worker = int(number[0]) if number else 0
+    os.sched_setaffinity(0, {cores[(os.getppid() + worker) % len(cores)]})
 
 
 def log_as_json() -> None:
