@@ -13,7 +13,8 @@ import numpy as np
 from sqlalchemy import insert
 
 from models.envs import registry
-from models.envs.parent_child import CHILD, STAY
+from models.envs.grid import STAY
+from models.envs.parent_child import CHILD
 from models.vocabulary import SILENT
 from server.domain import canonical, events, participation, trial, view
 from server.domain.events import Body, Move, Said

@@ -37,6 +37,8 @@ class Environment(Protocol[S]):
     """(N,) which seats may speak at all."""
     message_held: bool
     """True: the first message of an episode is repeated at every step."""
+    sought: int | None
+    """Seat whose place the others look for; None where there is none."""
 
     def init(self, seeds: Seeds) -> S:
         """Return the states (B,) in which these episodes begin."""

@@ -5,9 +5,7 @@ Seat 1 is the child: it never moves, its action is ignored, and only it may spea
 at every step. The two begin on distinct uniformly drawn cells. An episode ends when the parent stands on the
 child, or after 20 steps. Each step pays both seats 0.05, and -0.05 as long as the child is not found.
 
-An observation is the own 3x3 window, row by row; each cell of it is [one-hot of the cell's index, a spare
-that is always 0, outside, number of children there, number of parents there], dim*dim + 4 numbers. (The spare
-keeps the length of the paper's code.) A cell outside the grid has no index.
+An observation is the own 3x3 window, see `models.envs.grid`: the child is sought, the parent seeks.
 
 Source: Karten et al. 2023, human experiment 1: Predator-Prey with one predator and one talking prey.
 """
@@ -18,17 +16,12 @@ import numpy as np
 
 from models import rng
 from models.envs.api import Bools, Floats, Ints, Seeds, where
+from models.envs.grid import STAY, Grid
 
 PARENT, CHILD = 0, 1
-UP, RIGHT, DOWN, LEFT, STAY = range(5)
-MOVES: tuple[tuple[int, int], ...] = ((-1, 0), (0, 1), (1, 0), (0, -1), (0, 0))
-"""(row, column) of each action."""
 
 PLACES = 2
 """Stream of the first cells: index 0 the parent, 1 the child among the cells that are left."""
-
-_MOVES = np.array(MOVES, np.int32)
-_OUTSIDE, _CHILD, _PARENT = 1, 2, 3  # after the dim * dim cell indices
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,21 +44,19 @@ class ParentChild:
     name = "parent_child"
     version = 1
     agents = 2
-    actions = 5
+    actions = STAY + 1
     steps_max = 20
     dim = 9
     vision = 1
     message_held = True
+    sought: int | None = CHILD
 
     def __init__(self) -> None:
         self.shape = (self.dim, self.dim)
         self.cells = self.dim * self.dim
         self.speaks: Bools = np.array([False, True])
-        self.window = 2 * self.vision + 1
-        self.observation_size = self.window**2 * (self.cells + 4)
-        reach = np.arange(-self.vision, self.vision + 1, dtype=np.int32)
-        self._offset_row = np.repeat(reach, self.window)
-        self._offset_col = np.tile(reach, self.window)
+        self._grid = Grid(self.dim, self.vision)
+        self.observation_size = self._grid.observation_size
 
     def init(self, seeds: Seeds) -> ParentChildState:
         seed = np.array(seeds, np.uint64)
@@ -88,9 +79,7 @@ class ParentChild:
         )
 
     def step(self, state: ParentChildState, actions: Ints) -> tuple[ParentChildState, Floats]:
-        move = _MOVES[actions[:, PARENT]]  # (B, 2)
-        row = np.clip(state.parent_row + move[:, 0], 0, self.dim - 1)
-        col = np.clip(state.parent_col + move[:, 1], 0, self.dim - 1)
+        row, col = self._grid.walk(state.parent_row, state.parent_col, actions[:, PARENT])
         found = (row == state.child_row) & (col == state.child_col)
         after = replace(state, t=state.t + np.int32(1), parent_row=row, parent_col=col, found=found)
         over = self.done(state)
@@ -99,15 +88,8 @@ class ParentChild:
         return where(over, state, after), np.repeat(reward[:, None], self.agents, axis=1)
 
     def observe(self, state: ParentChildState) -> Floats:
-        row = self._pair(state.parent_row, state.child_row)[:, :, None] + self._offset_row  # (B, N, W)
-        col = self._pair(state.parent_col, state.child_col)[:, :, None] + self._offset_col
-        inside = (row >= 0) & (row < self.dim) & (col >= 0) & (col < self.dim)
-        kind = np.where(inside, row * self.dim + col, self.cells + _OUTSIDE)
-        seen = np.zeros((*kind.shape, self.cells + 4), np.float32)
-        np.put_along_axis(seen, kind[..., None], np.float32(1), axis=-1)
-        seen[..., self.cells + _CHILD] = self._at(row, col, state.child_row, state.child_col)
-        seen[..., self.cells + _PARENT] = self._at(row, col, state.parent_row, state.parent_col)
-        return seen.reshape(len(state.t), self.agents, self.observation_size)
+        cell = self.cell_of(state)
+        return self._grid.windows(cell, cell[:, CHILD], cell[:, [PARENT]])
 
     def alive(self, state: ParentChildState) -> Bools:
         return np.ones((len(state.t), self.agents), np.bool_)
@@ -131,7 +113,3 @@ class ParentChild:
 
     def _pair(self, parent: Ints, child: Ints) -> Ints:
         return np.stack([parent, child], axis=1).astype(np.int32, copy=False)
-
-    @staticmethod
-    def _at(row: Ints, col: Ints, seat_row: Ints, seat_col: Ints) -> Bools:
-        return np.equal(row, seat_row[:, None, None]) & np.equal(col, seat_col[:, None, None])

@@ -6,12 +6,15 @@ from typing import Any
 
 from models.envs.api import Environment
 from models.envs.parent_child import ParentChild
+from models.envs.predator_prey import PredatorPrey
 from models.envs.traffic_junction import TrafficJunction
 
 _TASKS: dict[str, Callable[[], Environment[Any]]] = {
     "traffic_junction/easy": lambda: TrafficJunction("easy"),
     "traffic_junction/medium": lambda: TrafficJunction("medium"),
     "traffic_junction/hard": lambda: TrafficJunction("hard"),
+    "predator_prey/5x5": lambda: PredatorPrey("5x5"),
+    "predator_prey/10x10": lambda: PredatorPrey("10x10"),
     "parent_child": ParentChild,
 }
 

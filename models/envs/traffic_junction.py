@@ -88,6 +88,7 @@ class TrafficJunction:
     version = 1
     actions = 2
     message_held = False
+    sought: int | None = None
 
     def __init__(self, size: roads.Size) -> None:
         plan = roads.PLANS[size]

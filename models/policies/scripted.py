@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from models import rng
 from models.envs.api import Environment, Ints
-from models.envs.parent_child import DOWN, LEFT, MOVES, RIGHT, STAY, UP, ParentChild, ParentChildState
+from models.envs.grid import MOVES, STAY, towards
+from models.envs.parent_child import ParentChild, ParentChildState
 from models.envs.right_of_way import right_of_way
 from models.envs.traffic_junction import GAS, TrafficJunction
 
@@ -143,13 +144,7 @@ def _distance(state: ParentChildState) -> tuple[Ints, Ints]:
 
 
 def _towards_child(state: ParentChildState) -> Ints:
-    return _towards(state.parent_row, state.parent_col, state.child_row, state.child_col)
-
-
-def _towards(row: Any, col: Any, to_row: Any, to_col: Any) -> Ints:
-    """Return the action of a shortest walk, rows first; STAY on arrival."""
-    ways = [to_row < row, to_row > row, to_col < col, to_col > col]
-    return np.select(ways, [UP, DOWN, LEFT, RIGHT], STAY).astype(np.int32)
+    return towards(state.parent_row, state.parent_col, state.child_row, state.child_col)
 
 
 def _with_child(parent: Ints) -> Ints:
@@ -169,13 +164,13 @@ def _tour() -> NDArray[np.int32]:
     for begin, end in pairwise(corners):
         cell = begin
         while cell != end:
-            step = int(_towards(*cell, *end))
+            step = int(towards(*cell, *end))
             loop[cell] = step
             cell = cell[0] + MOVES[step][0], cell[1] + MOVES[step][1]
     tour = np.zeros((ParentChild.dim, ParentChild.dim), np.int32)
     for row, col in np.ndindex(ParentChild.dim, ParentChild.dim):
         nearest = min(loop, key=lambda cell: abs(cell[0] - row) + abs(cell[1] - col))
-        tour[row, col] = loop.get((row, col), _towards(row, col, *nearest))
+        tour[row, col] = loop.get((row, col), towards(row, col, *nearest))
     return tour
 
 

@@ -62,8 +62,8 @@ class Decoder(_Strict):
     """Information similarity: an auxiliary reader of what an agent heard, in training only."""
 
     target: Literal["none", "occupancy", "location", "coordinates"] = "none"
-    """occupancy: cells of the other cars now and after gas; location: cell of the speaker; coordinates: its
-    row and column.
+    """occupancy: cells of the other cars now and after gas; location: cell of the child or prey; coordinates:
+    its row and column.
     """
     reads: Literal["inbox", "heard"] = "heard"
     """inbox: linear in the mean message; heard: a small network on [second hidden, inbox]."""

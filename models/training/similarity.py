@@ -1,9 +1,9 @@
 """Information similarity: can the world be read off what was heard? An auxiliary loss, in training only.
 
 Traffic Junction: occupancy of every road cell by the other cars now, and the cells that they would enter with
-gas (their intent). Parent & Lost Child: the cell of the speaker, or its row and column; where messages are
-vectors, row and column are read from the message and the message is predicted from row and column, so that
-near places get near messages. Shapes: M rows, C road cells, D message.
+gas (their intent). Parent & Lost Child, Predator-Prey: the cell of whoever is sought, or its row and column,
+read by the seekers; where messages are vectors, row and column are read from the message and the message is
+predicted from row and column, so that near places get near messages. Shapes: M rows, C road cells, D message.
 
 Source: Karten et al. 2023, information similarity; intent after the paper's section on Traffic Junction.
 """
@@ -64,9 +64,10 @@ def similarity_loss(env: Environment[Any], reader: Reader, seen: Unrolled) -> Te
         target = torch.from_numpy(occupancy(env, seen))
         read = reader(seen.hidden, seen.inbox)
         return nn.functional.binary_cross_entropy_with_logits(read, target, reduction="none").sum(1).mean()
-    listens = ~env.speaks[seen.place % env.agents]
-    rows = torch.from_numpy(np.flatnonzero(listens))
-    cell = torch.from_numpy(_speaker_cell(env, seen)[listens])
+    assert env.sought is not None
+    seeks = seen.place % env.agents != env.sought
+    rows = torch.from_numpy(np.flatnonzero(seeks))
+    cell = torch.from_numpy(_sought_cell(env, env.sought, seen)[seeks])
     read = reader(seen.hidden[rows], seen.inbox[rows])
     if reader.settings.target == "location":
         return nn.functional.cross_entropy(read, cell)
@@ -101,8 +102,7 @@ def _others(columns: Any, size: int, seen: Unrolled) -> np.ndarray[Any, np.dtype
     return np.asarray(rows > 0, np.float32)
 
 
-def _speaker_cell(env: Environment[Any], seen: Unrolled) -> np.ndarray[Any, np.dtype[np.int64]]:
-    """(M,) cell of the one seat that speaks, at each row's step and episode."""
-    speaker = int(np.flatnonzero(env.speaks)[0])
-    cells = np.stack([env.cell_of(state)[:, speaker] for state in seen.states[:-1]])  # (T, B)
+def _sought_cell(env: Environment[Any], sought: int, seen: Unrolled) -> np.ndarray[Any, np.dtype[np.int64]]:
+    """(M,) cell of the seat that is sought, at each row's step and episode."""
+    cells = np.stack([env.cell_of(state)[:, sought] for state in seen.states[:-1]])  # (T, B)
     return np.asarray(cells[seen.step, seen.place // env.agents], np.int64)

@@ -1,4 +1,4 @@
-"""Both tasks once more, straight from their rules: one episode, plain Python, no numpy.
+"""All tasks once more, straight from their rules: one episode, plain Python, no numpy.
 
 Slow and obvious on purpose; the batched environments must agree with it in every number.
 """
@@ -144,15 +144,70 @@ def move(state: Search, action: int) -> Search:
     """Return the state after the parent went up, right, down, left or stayed."""
     if state.over:
         return Search(state.parent, state.child, state.steps, 0.0)
-    row, column = state.parent
+    parent = _walked(state.parent, action, side=9)
+    return Search(parent, state.child, state.steps + 1, 0.05 if parent == state.child else -0.05)
+
+
+def _walked(cell: tuple[int, int], action: int, side: int) -> tuple[int, int]:
+    row, column = cell
     if action == 0 and row > 0:
         row -= 1
-    elif action == 1 and column < 8:
+    elif action == 1 and column < side - 1:
         column += 1
-    elif action == 2 and row < 8:
+    elif action == 2 and row < side - 1:
         row += 1
     elif action == 3 and column > 0:
         column -= 1
-    return Search(
-        (row, column), state.child, state.steps + 1, 0.05 if (row, column) == state.child else -0.05
-    )
+    return row, column
+
+
+@dataclass
+class Hunt:
+    """Predator-Prey at one moment."""
+
+    side: int
+    vision: int
+    predators: list[tuple[int, int]]
+    prey: tuple[int, int]
+
+    @property
+    def caught(self) -> bool:
+        return all(cell == self.prey for cell in self.predators)
+
+    def rewards(self) -> list[float]:
+        """Return what being here pays each predator, and the prey last."""
+        together = sum(cell == self.prey for cell in self.predators)
+        each = [0.05 * together if cell == self.prey else -0.05 for cell in self.predators]
+        return [*each, sum(each) / len(each)]
+
+    def window(self, seat: int) -> list[dict[int, int]]:
+        """Return what a seat sees: for each cell of its window the non-zero entries of side * side + 4."""
+        row, column = [*self.predators, self.prey][seat]
+        cells = []
+        for r in range(row - self.vision, row + self.vision + 1):
+            for c in range(column - self.vision, column + self.vision + 1):
+                inside = 0 <= r < self.side and 0 <= c < self.side
+                entries = {self.side * r + c: 1} if inside else {self.side**2 + 1: 1}
+                if (r, c) == self.prey:
+                    entries[self.side**2 + 2] = 1
+                if (r, c) in self.predators:
+                    entries[self.side**2 + 3] = self.predators.count((r, c))
+                cells.append(entries)
+        return cells
+
+
+def hunt(side: int, predators: int, vision: int, seed: int) -> Hunt:
+    """Return the beginning of an episode: each seat, the prey last, anywhere but on those before it."""
+    free = [(row, column) for row in range(side) for column in range(side)]
+    seats = range(predators + 1)
+    *hunters, prey = [free.pop(rng.below(rng.word(seed, 4, 0, seat), len(free))) for seat in seats]
+    return Hunt(side, vision, hunters, prey)
+
+
+def chase(before: Hunt, actions: list[int]) -> Hunt:
+    """Return the state after every predator that is not on the prey went its way."""
+    after = [
+        cell if cell == before.prey else _walked(cell, action, before.side)
+        for cell, action in zip(before.predators, actions, strict=False)
+    ]
+    return Hunt(before.side, before.vision, after, before.prey)

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from models.envs.grid import towards
 from models.envs.parent_child import ParentChild
+from models.envs.predator_prey import PredatorPrey
 from models.envs.traffic_junction import TrafficJunction, TrafficState, with_arrival
 from tests.models.envs import reference
 
@@ -104,3 +106,40 @@ def test_the_search_agrees_with_the_rules_in_every_number() -> None:
             assert env.done(state)[b] == after.over
             assert env.success(state)[b] == (after.parent == after.child)
             assert reward[b].tolist() == [np.float32(after.reward)] * 2
+
+
+def _straight(cells: np.ndarray, side: int) -> np.ndarray:
+    return towards(*divmod(cells, side), *divmod(cells[:, -1:], side))
+
+
+@pytest.mark.parametrize(
+    ("size", "side", "predators", "vision", "steps"), [("5x5", 5, 3, 0, 20), ("10x10", 10, 5, 1, 40)]
+)
+def test_the_hunt_agrees_with_the_rules_in_every_number(
+    size: str, side: int, predators: int, vision: int, steps: int
+) -> None:
+    env = PredatorPrey(size)
+    draws = np.random.default_rng(7)
+    shape = (steps + 2, EPISODES, predators + 1)
+    actions = draws.integers(0, env.actions, shape).astype(np.int32)
+    keen = draws.random(shape) < draws.random((EPISODES, 1))  # each episode has its own share of the way
+    state = env.init(np.arange(EPISODES, dtype=np.uint64))
+    hunts = [reference.hunt(side, predators, vision, seed) for seed in range(EPISODES)]
+    for step, stray in enumerate(actions):
+        observation = env.observe(state)
+        over = step >= steps
+        row = np.where(keen[step], _straight(env.cell_of(state), side), stray).astype(np.int32)
+        state, reward = env.step(state, row)
+        cells, success = env.cell_of(state).tolist(), env.success(state).tolist()
+        for b, before in enumerate(hunts):
+            if b < OBSERVED:
+                seen = observation[b].reshape(predators + 1, (2 * vision + 1) ** 2, side**2 + 4)
+                windows = [[{int(i): int(c[i]) for i in np.flatnonzero(c)} for c in seat] for seat in seen]
+                assert windows == [before.window(seat) for seat in range(predators + 1)]
+            after = hunts[b] = before if over else reference.chase(before, row[b].tolist())
+            assert cells[b] == [side * r + c for r, c in [*after.predators, after.prey]]
+            assert success[b] == after.caught
+            expected = [0.0] * (predators + 1) if over else after.rewards()
+            np.testing.assert_allclose(reward[b], expected, rtol=1e-6, atol=1e-8)
+        assert (env.done(state) == (step + 1 >= steps)).all()
+    assert 0.1 < np.mean([hunt.caught for hunt in hunts]) < 0.9

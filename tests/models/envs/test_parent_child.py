@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from models.envs.parent_child import DOWN, LEFT, RIGHT, STAY, UP, ParentChild, ParentChildState
+from models.envs.grid import DOWN, LEFT, RIGHT, STAY, UP
+from models.envs.parent_child import ParentChild, ParentChildState
 
 ENV = ParentChild()
 

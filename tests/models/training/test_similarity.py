@@ -44,8 +44,8 @@ def reads_first_two(made: Reader) -> Reader:
     return made
 
 
-def cost(made: Reader, seen: Any) -> float:
-    return float(similarity_loss(SEARCH, made, seen).detach())
+def cost(made: Reader, seen: Any, env: Any = SEARCH) -> float:
+    return float(similarity_loss(env, made, seen).detach())
 
 
 def first_two(place: torch.Tensor) -> torch.Tensor:
@@ -74,3 +74,46 @@ def test_a_message_that_says_nothing_costs_the_squared_distance_of_the_guess() -
     loss = cost(reads_first_two(reader(vectors=False)), heard(lambda _: torch.zeros(9, 4)))
     places = np.stack([np.arange(9), np.arange(9)]) / 8
     assert loss == pytest.approx((places**2).sum(axis=0).mean())
+
+
+def hunted(env: Any, inbox_of_place: Any) -> Any:
+    """Nine steps of a hunt in two episodes, a row of each seat; predators have heard where the prey is."""
+    state = env.init(np.arange(2, dtype=np.uint64))
+    place = np.tile(np.arange(2 * env.agents), 9)
+    prey = torch.from_numpy(state.prey[place // env.agents].astype(np.int64))
+    inbox = inbox_of_place(prey)
+    inbox[place % env.agents == env.sought] = 9.0  # what the prey hears is nobody's business
+    return SimpleNamespace(
+        states=(state,) * 10,
+        step=np.repeat(np.arange(9), 2 * env.agents),
+        place=place,
+        hidden=torch.zeros(len(place), 3),
+        inbox=inbox,
+    )
+
+
+@pytest.mark.parametrize("task", ["predator_prey/5x5", "predator_prey/10x10"])
+def test_predators_read_the_cell_of_the_prey(task: str) -> None:
+    env = registry.make(task)
+    made = Reader(env, Decoder(target="location", reads="inbox"), 3, env.cells, vectors=True)
+    with torch.no_grad():
+        made.read.weight.copy_(50 * torch.eye(env.cells))
+        made.read.bias.zero_()
+
+    def told(prey: torch.Tensor) -> torch.Tensor:
+        return torch.nn.functional.one_hot(prey, env.cells).float()
+
+    right = cost(made, hunted(env, told), env)
+    wrong = cost(made, hunted(env, lambda prey: told((prey + 1) % env.cells)), env)
+    assert right == pytest.approx(0, abs=1e-6)
+    assert wrong == pytest.approx(50, abs=1e-3)
+
+
+def test_predators_read_row_and_column_of_the_prey() -> None:
+    env = registry.make("predator_prey/5x5")
+    made = reads_first_two(Reader(env, COORDINATES, 3, 4, vectors=True))
+
+    def told(prey: torch.Tensor) -> torch.Tensor:
+        return first_two(torch.stack((prey // 5, prey % 5), 1) / 4)
+
+    assert cost(made, hunted(env, told), env) == 0
