@@ -73,9 +73,9 @@ def train(
     bundles: BundlesOption = BUNDLES,
 ) -> None:
     """Train what a recipe describes; RUN_DIR then holds log.csv, the recipe and the checkpoint."""
-    from models import release as releasing
     from models import training
     from models.training.checkpoint import CheckpointError
+    from models.training.held import Provenance
 
     source = _recipe_path(recipe)
     folder = out or Path("runs") / source.stem
@@ -83,7 +83,7 @@ def train(
         training.config.load(source)
         own = _own_recipe(source, folder, seed, resume)
         if not resume:
-            releasing.Provenance.here().write(folder)
+            Provenance.here().write(folder)
         result = training.run(own, folder, resume=resume, bundles=bundles)
     except (training.RecipeError, training.TrainingError, CheckpointError) as error:
         _refuse(error)

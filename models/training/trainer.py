@@ -23,7 +23,7 @@ from models.envs import registry
 from models.policies import bundle
 from models.policies.channels import PrototypeChannel
 from models.policies.recurrent import Architecture, RecurrentNet, RecurrentPolicy
-from models.training import checkpoint
+from models.training import checkpoint, held
 from models.training.checks import Checked, calibrate, check
 from models.training.config import Phase, Recipe
 from models.training.curriculum import Progress, between, same_regime
@@ -58,6 +58,7 @@ class Trainer:
         self.best: dict[str, Tensor] = {}
         self.best_score = float("-inf")
         self.status = recipe.name
+        self._codebook_due = False  # inherited weights without one: the first discrete phase builds it
         self._uses = torch.zeros(recipe.model.tokens, dtype=torch.int64)
         self._seconds = 0.0
         self._losses: dict[str, float] = {}
@@ -68,8 +69,8 @@ class Trainer:
 
     def open(self, resume: bool) -> None:
         """Start afresh, or from the folder's checkpoint."""
-        held = (self.folder / checkpoint.FILE).exists()
-        if held and not resume:
+        begun = (self.folder / checkpoint.FILE).exists()
+        if begun and not resume:
             raise TrainingError(f"{self.folder}: holds a run already; resume it or choose another folder")
         self.folder.mkdir(parents=True, exist_ok=True)
         torch.manual_seed(self.recipe.seed)
@@ -78,7 +79,7 @@ class Trainer:
             Architecture(observation_size=self.env.observation_size, actions=self.env.actions, **sizes)
         )
         self.learner = Learner(self.env, net, self.recipe.decoder)
-        if held:
+        if begun:
             self._restore()
             return
         if self.recipe.init_from is not None:
@@ -88,21 +89,32 @@ class Trainer:
             csv.writer(file).writerow(COLUMNS)
 
     def _inherit(self, name: str) -> None:
-        """Take the weights of a released bundle; a gate that it lacks begins open."""
-        try:
-            source = bundle.load(self.bundles / name).policy
-        except bundle.BundleError as error:
-            raise TrainingError(f"init_from {name}: {error}; train that recipe first") from None
-        assert isinstance(source, RecurrentPolicy)
+        """Take the weights of a bundle or run; channel and gate may begin anew, such a gate open."""
+        weights = self._ancestor(name)
         own = self.learner.net.state_dict()
-        weights = source.weights()
         odd = [key for key, value in own.items() if key in weights and weights[key].shape != value.shape]
-        if odd or set(weights) - set(own):
+        anew = {key for key in own if key.startswith(("channel.", "gate."))}
+        if odd or set(weights) - set(own) or set(own) - set(weights) - anew:
             raise TrainingError(f"init_from {name}: its sizes are not those of [model]")
         self.learner.net.load_state_dict(own | weights)
+        self._codebook_due = "channel.codebook" in set(own) - set(weights)
         if self.learner.net.gate is not None and "gate.bias" not in weights:
             torch.nn.init.zeros_(self.learner.net.gate.weight)
             torch.nn.init.constant_(self.learner.net.gate.bias, 1.0)
+
+    def _ancestor(self, name: str) -> dict[str, Tensor]:
+        """Weights of a bundle, or of ``run:recipe``, that recipe's run with the same seed."""
+        try:
+            if not name.startswith(held.ANCESTOR):
+                source = bundle.load(self.bundles / name).policy
+                assert isinstance(source, RecurrentPolicy)
+                return source.weights()
+            run = held.read(held.ancestor_folder(self.folder, name, self.recipe.seed))
+        except (bundle.BundleError, held.RunError, checkpoint.CheckpointError) as error:
+            raise TrainingError(f"init_from {name}: {error}; train that recipe first") from None
+        if not run.finished:
+            raise TrainingError(f"init_from {name}: that run is not finished; train it to its end first")
+        return run.policy.weights()
 
     def _enter(self) -> None:
         """Begin the phase at hand: codebook, optimiser, controller."""
@@ -110,7 +122,7 @@ class Trainer:
         before = self.recipe.phase[self.at.phase - 1] if self.at.phase else None
         if before is not None and not same_regime(self.recipe, self.at.phase - 1, self.at.phase):
             self.best, self.best_score = {}, float("-inf")
-        if before is not None and phase.discrete and not before.discrete:
+        if phase.discrete and (self._codebook_due if before is None else not before.discrete):
             self._build_codebook()
         self.optimiser = torch.optim.Adam(self.learner.parameters(), lr=phase.lr)
         budget = phase.budget if phase.gate == "enforced" else None
@@ -260,23 +272,23 @@ class Trainer:
         checkpoint.write(self.folder, tensors, facts)
 
     def _restore(self) -> None:
-        held = checkpoint.read(self.folder)
-        if held.facts["recipe"] != fingerprint(self.recipe):
+        kept = checkpoint.read(self.folder)
+        if kept.facts["recipe"] != fingerprint(self.recipe):
             raise TrainingError(f"{self.folder}: belongs to another recipe; choose another folder")
-        self.at = Progress.from_dict(held.facts["at"])
+        self.at = Progress.from_dict(kept.facts["at"])
         self._enter_again()
-        self.learner.load_state_dict(checkpoint.part_of(held.tensors, "learner."))
-        self.best = checkpoint.part_of(held.tensors, "best.")
-        score = held.facts["best_score"]
+        self.learner.load_state_dict(checkpoint.part_of(kept.tensors, "learner."))
+        self.best = checkpoint.part_of(kept.tensors, "best.")
+        score = kept.facts["best_score"]
         self.best_score = float("-inf") if score is None else score
-        checkpoint.restore_optimiser(self.optimiser, held.tensors)
-        self._uses = held.tensors["uses"]
-        if held.facts["enforcer"] is not None and self.enforcer is not None:
-            previous, total = held.facts["enforcer"]
+        checkpoint.restore_optimiser(self.optimiser, kept.tensors)
+        self._uses = kept.tensors["uses"]
+        if kept.facts["enforcer"] is not None and self.enforcer is not None:
+            previous, total = kept.facts["enforcer"]
             self.enforcer = replace(self.enforcer, previous=previous, total=total)
-        self.finished, self._seconds = held.facts["finished"], held.facts["seconds"]
+        self.finished, self._seconds = kept.facts["finished"], kept.facts["seconds"]
         with (self.folder / LOG).open("r+b") as file:
-            file.truncate(held.facts["log_bytes"])
+            file.truncate(kept.facts["log_bytes"])
 
     def _enter_again(self) -> None:
         self.optimiser = torch.optim.Adam(self.learner.parameters(), lr=self.phase.lr)
