@@ -38,7 +38,7 @@ class Bursts:
         by_start: (W,) rate in the window from step w on, over all episodes; None where nobody lived.
         least: smallest of them.
         most: largest of them.
-        quantiles: of the rates in single windows of single episodes, by share.
+        single_quantiles: of the rates in single windows of single episodes, by percent, such as `q95`.
         single_least: smallest rate in a single window of one episode.
         single_most: largest.
     """
@@ -46,7 +46,7 @@ class Bursts:
     by_start: tuple[float | None, ...]
     least: float
     most: float
-    quantiles: dict[str, float]
+    single_quantiles: dict[str, float]
     single_least: float
     single_most: float
 
@@ -76,7 +76,7 @@ def bursts(counted: Windows) -> Bursts | None:
         tuple(by_start),
         min(known),
         max(known),
-        {f"{share:g}": float(value) for share, value in zip(QUANTILES, quantiles, strict=True)},
+        {f"q{100 * share:02.0f}": float(value) for share, value in zip(QUANTILES, quantiles, strict=True)},
         float(single.min()),
         float(single.max()),
     )

@@ -5,6 +5,7 @@ recipe.toml  provenance.json  checkpoint.safetensors  log.csv
 
 import hashlib
 import json
+import re
 import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -30,6 +31,7 @@ class RunError(Exception):
 class Run:
     """A run as it stands."""
 
+    folder: Path
     recipe: Recipe
     policy: RecurrentPolicy
     """The best of the phase at hand, with that phase's messages and gate."""
@@ -61,12 +63,26 @@ def read(folder: Path) -> Run:
     except ValueError as error:
         raise RunError(f"{folder}: {error}; its checkpoint is of another recipe") from None
     policy = RecurrentPolicy(net, phase.discrete, phase.gate == "open")
-    return Run(recipe, policy, finished, int(at["total"]), int(at["steps"]))
+    return Run(folder, recipe, policy, finished, int(at["total"]), int(at["steps"]))
 
 
-def ancestor_folder(folder: Path, init_from: str, seed: int) -> Path:
-    """Folder of the run that a run in this folder starts from."""
-    return folder.absolute().parent / f"{init_from.removeprefix(ANCESTOR)}-{seed}"
+def ancestor(folder: Path, init_from: str, seed: int) -> Run:
+    """The finished run that a run in this folder starts from.
+
+    Raises:
+        RunError: it is missing or not finished.
+        RecipeError: its recipe is wrong.
+        CheckpointError: its checkpoint is damaged.
+    """
+    run = read(folder.absolute().parent / f"{init_from.removeprefix(ANCESTOR)}-{seed}")
+    if not run.finished:
+        raise RunError(f"{run.folder}: not finished; run hatlab train --resume")
+    return run
+
+
+def with_seed(recipe: str, seed: int) -> str:
+    """The text of a recipe with another seed."""
+    return re.sub(r"(?m)^seed\s*=.*$", f"seed = {seed}", recipe, count=1)
 
 
 def architecture(recipe: Recipe) -> Architecture:

@@ -23,11 +23,12 @@ from models.envs import registry
 from models.policies import bundle
 from models.policies.channels import PrototypeChannel
 from models.policies.recurrent import Architecture, RecurrentNet, RecurrentPolicy
-from models.training import checkpoint, held
+from models.training import checkpoint
 from models.training.checks import Checked, calibrate, check
 from models.training.config import Phase, Recipe
 from models.training.curriculum import Progress, between, same_regime
 from models.training.enforcer import Enforcer
+from models.training.held import ANCESTOR, RunError, ancestor
 from models.training.overrides import Overrides
 from models.training.quantise import head_start, kmeans, revived
 from models.training.reinforce import Learner, gradient_loss, shares
@@ -69,8 +70,8 @@ class Trainer:
 
     def open(self, resume: bool) -> None:
         """Start afresh, or from the folder's checkpoint."""
-        begun = (self.folder / checkpoint.FILE).exists()
-        if begun and not resume:
+        held = (self.folder / checkpoint.FILE).exists()
+        if held and not resume:
             raise TrainingError(f"{self.folder}: holds a run already; resume it or choose another folder")
         self.folder.mkdir(parents=True, exist_ok=True)
         torch.manual_seed(self.recipe.seed)
@@ -79,7 +80,7 @@ class Trainer:
             Architecture(observation_size=self.env.observation_size, actions=self.env.actions, **sizes)
         )
         self.learner = Learner(self.env, net, self.recipe.decoder)
-        if begun:
+        if held:
             self._restore()
             return
         if self.recipe.init_from is not None:
@@ -105,16 +106,13 @@ class Trainer:
     def _ancestor(self, name: str) -> dict[str, Tensor]:
         """Weights of a bundle, or of ``run:recipe``, that recipe's run with the same seed."""
         try:
-            if not name.startswith(held.ANCESTOR):
-                source = bundle.load(self.bundles / name).policy
-                assert isinstance(source, RecurrentPolicy)
-                return source.weights()
-            run = held.read(held.ancestor_folder(self.folder, name, self.recipe.seed))
-        except (bundle.BundleError, held.RunError, checkpoint.CheckpointError) as error:
+            if name.startswith(ANCESTOR):
+                return ancestor(self.folder, name, self.recipe.seed).policy.weights()
+            source = bundle.load(self.bundles / name).policy
+        except (bundle.BundleError, RunError, checkpoint.CheckpointError) as error:
             raise TrainingError(f"init_from {name}: {error}; train that recipe first") from None
-        if not run.finished:
-            raise TrainingError(f"init_from {name}: that run is not finished; train it to its end first")
-        return run.policy.weights()
+        assert isinstance(source, RecurrentPolicy)
+        return source.weights()
 
     def _enter(self) -> None:
         """Begin the phase at hand: codebook, optimiser, controller."""
@@ -272,23 +270,23 @@ class Trainer:
         checkpoint.write(self.folder, tensors, facts)
 
     def _restore(self) -> None:
-        kept = checkpoint.read(self.folder)
-        if kept.facts["recipe"] != fingerprint(self.recipe):
+        held = checkpoint.read(self.folder)
+        if held.facts["recipe"] != fingerprint(self.recipe):
             raise TrainingError(f"{self.folder}: belongs to another recipe; choose another folder")
-        self.at = Progress.from_dict(kept.facts["at"])
+        self.at = Progress.from_dict(held.facts["at"])
         self._enter_again()
-        self.learner.load_state_dict(checkpoint.part_of(kept.tensors, "learner."))
-        self.best = checkpoint.part_of(kept.tensors, "best.")
-        score = kept.facts["best_score"]
+        self.learner.load_state_dict(checkpoint.part_of(held.tensors, "learner."))
+        self.best = checkpoint.part_of(held.tensors, "best.")
+        score = held.facts["best_score"]
         self.best_score = float("-inf") if score is None else score
-        checkpoint.restore_optimiser(self.optimiser, kept.tensors)
-        self._uses = kept.tensors["uses"]
-        if kept.facts["enforcer"] is not None and self.enforcer is not None:
-            previous, total = kept.facts["enforcer"]
+        checkpoint.restore_optimiser(self.optimiser, held.tensors)
+        self._uses = held.tensors["uses"]
+        if held.facts["enforcer"] is not None and self.enforcer is not None:
+            previous, total = held.facts["enforcer"]
             self.enforcer = replace(self.enforcer, previous=previous, total=total)
-        self.finished, self._seconds = kept.facts["finished"], kept.facts["seconds"]
+        self.finished, self._seconds = held.facts["finished"], held.facts["seconds"]
         with (self.folder / LOG).open("r+b") as file:
-            file.truncate(kept.facts["log_bytes"])
+            file.truncate(held.facts["log_bytes"])
 
     def _enter_again(self) -> None:
         self.optimiser = torch.optim.Adam(self.learner.parameters(), lr=self.phase.lr)
