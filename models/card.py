@@ -66,14 +66,14 @@ def _facts(manifest: Manifest) -> str:
         "sizes": ", ".join(f"{name} {size}" for name, size in sorted(sizes.items())),
         "trained": f"{manifest.steps_trained:,} environment steps, seed {manifest.seed}",
         "warm start": manifest.warm_start or "none",
-        "supervised help": _help(manifest.recipe),
+        "supervised help": supervised_help(manifest.recipe),
         "source": f"commit {manifest.git_commit}",
         "made": manifest.created,
     }
     return "\n".join(f"- {name}: {value}" for name, value in facts.items())
 
 
-def _help(recipe: dict[str, Any]) -> str:
+def supervised_help(recipe: dict[str, Any]) -> str:
     """What training used besides the reward."""
     used = []
     if recipe.get("decoder", {}).get("target", "none") != "none":

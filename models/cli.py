@@ -7,7 +7,6 @@ Exit code 0: done; 1: a check failed (a broken bundle); 2: bad input, one line o
 from __future__ import annotations
 
 import json
-import re
 import shutil
 import sys
 from enum import StrEnum
@@ -29,7 +28,7 @@ if TYPE_CHECKING:
 
 PACKAGE = Path(__file__).parent
 BUNDLES, RECIPES = PACKAGE / "bundles", PACKAGE / "recipes"
-BROKEN, BAD_INPUT = 1, 2
+FAILED, BAD_INPUT = 1, 2
 TABLE_WIDTH = 140
 
 
@@ -73,9 +72,9 @@ def train(
     bundles: BundlesOption = BUNDLES,
 ) -> None:
     """Train what a recipe describes; RUN_DIR then holds log.csv, the recipe and the checkpoint."""
-    from models import release as releasing
     from models import training
     from models.training.checkpoint import CheckpointError
+    from models.training.held import Provenance
 
     source = _recipe_path(recipe)
     folder = out or Path("runs") / source.stem
@@ -83,7 +82,7 @@ def train(
         training.config.load(source)
         own = _own_recipe(source, folder, seed, resume)
         if not resume:
-            releasing.Provenance.here().write(folder)
+            Provenance.here().write(folder)
         result = training.run(own, folder, resume=resume, bundles=bundles)
     except (training.RecipeError, training.TrainingError, CheckpointError) as error:
         _refuse(error)
@@ -196,6 +195,44 @@ def release(
     typer.echo(f"{bundles / made.name}: sha256 {made.sha256}")
 
 
+@app.command()
+def reproduce(
+    table: Annotated[
+        str, typer.Argument(metavar="TABLE", help="table1, table2, parent-child, human, or a TOML file.")
+    ],
+    jobs: Annotated[int, typer.Option(min=1, help="Agents that are trained at once.")] = 1,
+    only: Annotated[str, typer.Option(help="Recipes (or recipe-seed) to run, as a pattern: easy-*.")] = "*",
+    seeds: Annotated[
+        str | None, typer.Option(help="Seeds to run: 1,2.", show_default="those of the table")
+    ] = None,
+    run: Annotated[bool, typer.Option("--run/--no-run", help="--no-run only writes the table again.")] = True,
+    force: Annotated[bool, typer.Option("--force", help="Run them although they are stored.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder of tables and stored cells.")] = Path("docs/tables"),
+    runs: Annotated[Path, typer.Option(help="Folder of runs.")] = Path("runs"),
+    recipes: Annotated[
+        Path, typer.Option(help="Folder of recipes.", show_default="the packaged ones")
+    ] = RECIPES,
+    bundles: BundlesOption = BUNDLES,
+) -> None:
+    """Train and measure what is missing of a table, then write it; exit 1 if anything failed."""
+    from models import reproduce as reproducing
+
+    try:
+        asked = reproducing.tables.load(table)
+        wanted = asked.cells(only, _numbers(seeds))
+    except reproducing.tables.TableError as error:
+        _refuse(error)
+    if run and not wanted:
+        _refuse(f"{table}: no cell fits --only {only} --seeds {seeds or 'of the table'}")
+    shelf = reproducing.cells.Shelf(recipes, runs, out / "cells", bundles, asked.episodes)
+    report = reproducing.crew.run(shelf, jobs, wanted, force=force) if run else reproducing.crew.Report()
+    for path in reproducing.write(asked, shelf, out):
+        typer.echo(f"written: {path}")
+    if run:
+        typer.echo(str(report))
+    raise typer.Exit(FAILED if report.failed else 0)
+
+
 @app.command("bundles")
 def list_bundles(bundles: BundlesOption = BUNDLES) -> None:
     """List and verify all bundles; exit 1 if any is broken."""
@@ -220,13 +257,21 @@ def list_bundles(bundles: BundlesOption = BUNDLES) -> None:
     _print_table(table)
     for line in errors:
         typer.echo(line, err=True)
-    raise typer.Exit(BROKEN if errors else 0)
+    raise typer.Exit(FAILED if errors else 0)
 
 
 def _refuse(reason: object) -> NoReturn:
     """Say in one line what is wrong with the input, and leave."""
     typer.echo(" ".join(str(reason).split()), err=True)
     raise typer.Exit(BAD_INPUT)
+
+
+def _numbers(text: str | None) -> tuple[int, ...] | None:
+    if text is None:
+        return None
+    if not all(part.strip().isdecimal() for part in text.split(",")):
+        _refuse(f"--seeds {text}: whole numbers with commas between them, such as 1,2")
+    return tuple(int(part) for part in text.split(","))
 
 
 def _recipe_path(recipe: str) -> Path:
@@ -241,6 +286,8 @@ def _recipe_path(recipe: str) -> Path:
 
 def _own_recipe(source: Path, folder: Path, seed: int | None, resume: bool) -> Path:
     """Copy the recipe into the run's folder, with another seed if asked for; a resumed run keeps its own."""
+    from models.training.held import with_seed
+
     own = folder / "recipe.toml"
     if own.exists() and resume:
         return own
@@ -250,7 +297,7 @@ def _own_recipe(source: Path, folder: Path, seed: int | None, resume: bool) -> P
     shutil.copyfile(source, own)
     if seed is not None:
         text = own.read_text(encoding="utf-8")
-        own.write_text(re.sub(r"(?m)^seed\s*=.*$", f"seed = {seed}", text, count=1), encoding="utf-8")
+        own.write_text(with_seed(text, seed), encoding="utf-8")
     return own
 
 

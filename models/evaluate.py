@@ -6,10 +6,13 @@ What each number means:
 - reward: summed over an episode, mean over seats.
 - message_rate: messages sent per step of a living agent that may speak; message_rate_slots: per step of a
   seat that may speak, empty ones too (what the public IC3Net code counts).
-- tokens_used: tokens in use (`models.interpret.nulls.in_use`: from 1 % of the messages on, for nine tokens).
+- tokens_used: tokens in use (`models.interpret.nulls.in_use`: from 1 % of the messages on, for nine tokens;
+  a message that is held for the whole episode counts once).
 - Parent & Lost Child: found, and steps (20 if not found).
 - human starts, judged for the seat where a participant would sit: arrived, collided, limit (shares of
-  trials), trial_steps, and others_collided (two other cars crashed while the trial lasted).
+  trials), trial_steps, and others_collided (two other cars crashed while the trial lasted); and for every
+  seat the share of its cars that collided meanwhile (`models.seats`).
+- bursts: the message rate in every stretch of five steps (`models.bursts`).
 
 Intervals: Wilson for shares of episodes, else bootstrap over episodes (percentile, 1,000 resamples).
 
@@ -23,10 +26,12 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
+from models.bursts import Bursts, Windows, bursts, windows
 from models.interpret.estimate import EVALUATION, seed_batches
 from models.interpret.nulls import in_use
 from models.policies.team import Team
 from models.rollout import Rollout, Scripted, Trials, episodes, trials
+from models.seats import occupancies
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -71,7 +76,54 @@ class Question:
     masked: bool = False
 
 
+class Seat(NamedTuple):
+    """The cars of one seat in human trials."""
+
+    seat: int
+    participant: bool
+    """Whether people sit here."""
+    cars: int
+    """How many had the seat while a trial lasted."""
+    collided: Measure
+    """Share of them that shared a cell."""
+
+    def to_json(self) -> dict[str, Any]:
+        return {**self._asdict(), "collided": self.collided.to_json()}
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """Everything that was measured.
+
+    Attributes:
+        measures: by name, see the module's docstring.
+        bursts: message rates in windows; None where messages are held, and where nobody lived.
+        seats: of human trials, else empty.
+    """
+
+    measures: dict[str, Measure]
+    bursts: Bursts | None
+    seats: tuple[Seat, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        numbers: dict[str, Any] = {name: measure.to_json() for name, measure in self.measures.items()}
+        if self.bursts is not None:
+            numbers["bursts"] = self.bursts.to_json()
+        if self.seats:
+            numbers["seats"] = [seat.to_json() for seat in self.seats]
+        return numbers
+
+
 def evaluate(env: Environment[Any], players: Team | Scripted, question: Question) -> dict[str, Measure]:
+    """Measure players in a world: the measures of a `survey`.
+
+    Raises:
+        ValueError: the world has no such start or no arrivals.
+    """
+    return survey(env, players, question).measures
+
+
+def survey(env: Environment[Any], players: Team | Scripted, question: Question) -> Survey:
     """Measure players in a world.
 
     Raises:
@@ -83,7 +135,11 @@ def evaluate(env: Environment[Any], players: Team | Scripted, question: Question
         for seeds in seed_batches(question.episodes, question.seed, EVALUATION)
     ]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return _measures(columns, question.seed)
+    counted = None if env.message_held else Windows(columns.pop("window_sent"), columns.pop("window_living"))
+    booted = Bootstrap(columns, question.seed)
+    return Survey(
+        _measures(columns, booted), None if counted is None else bursts(counted), _seats(columns, booted)
+    )
 
 
 def _play(
@@ -103,12 +159,17 @@ def _columns(
         "sent": (rollout.gates & speaking).sum(axis=(0, 2)),
         "speakers": speaking.sum(axis=(0, 2)),
         "slots": rollout.steps * int(env.speaks.sum()),
-        "uses": _uses(rollout, tokens),
+        "uses": _uses(rollout, tokens, env.message_held),
     }
     if env.message_held:
         columns |= {"found": rollout.success, "steps": rollout.steps}
+    else:
+        counted = windows(rollout, env.speaks)
+        columns |= {"window_sent": counted.sent, "window_living": counted.living}
     if question.start == "human":
         columns |= _outcomes(trials(rollout))
+        seats = occupancies(rollout)
+        columns |= {"seat_cars": seats.cars, "seat_collided": seats.collided}
     return {name: value.astype(np.float64) for name, value in columns.items()}
 
 
@@ -122,11 +183,12 @@ def _outcomes(judged: Trials) -> dict[str, NDArray[Any]]:
     }
 
 
-def _uses(rollout: Rollout, tokens: int) -> NDArray[np.int64]:
-    """Messages sent of each token in each episode: (B, K)."""
+def _uses(rollout: Rollout, tokens: int, held: bool) -> NDArray[np.int64]:
+    """Messages sent of each token in each episode: (B, K); one that is held counts once."""
     uses = np.zeros((rollout.success.shape[0], tokens), np.int64)
     if tokens:
-        step, episode, seat = np.nonzero(rollout.gates & rollout.alive)
+        sent = rollout.gates & rollout.alive
+        step, episode, seat = np.nonzero(sent[:1] if held else sent)
         np.add.at(uses, (episode, rollout.tokens[step, episode, seat]), 1)
     return uses
 
@@ -135,10 +197,9 @@ SHARES = ("success", "found", "arrived", "collided", "limit", "others_collided")
 MEANS = ("reward", "steps", "trial_steps")
 
 
-def _measures(columns: dict[str, NDArray[np.float64]], seed: int) -> dict[str, Measure]:
+def _measures(columns: dict[str, NDArray[np.float64]], booted: Bootstrap) -> dict[str, Measure]:
     count = len(columns["success"])
     measures = {name: wilson(int(columns[name].sum()), count) for name in SHARES if name in columns}
-    booted = Bootstrap(columns, seed)
     for name in MEANS:
         if name in columns:
             measures[name] = booted.measure(lambda sums, name=name: sums[name] / count)  # type: ignore[misc]
@@ -146,6 +207,21 @@ def _measures(columns: dict[str, NDArray[np.float64]], seed: int) -> dict[str, M
         measures[name] = booted.measure(lambda sums, per=per: sums["sent"] / np.maximum(sums[per], 1))  # type: ignore[misc]
     measures["tokens_used"] = booted.measure(lambda sums: in_use(sums["uses"]).sum(axis=-1))
     return measures
+
+
+def _seats(columns: dict[str, NDArray[np.float64]], booted: Bootstrap) -> tuple[Seat, ...]:
+    """Share of the cars of each seat that collided; trials, not cars, are resampled."""
+    if "seat_cars" not in columns:
+        return ()
+    cars = columns["seat_cars"].sum(0)
+    last = len(cars) - 1
+
+    def share(seat: int) -> Measure:
+        return booted.measure(
+            lambda sums: sums["seat_collided"][:, seat] / np.maximum(sums["seat_cars"][:, seat], 1)
+        )
+
+    return tuple(Seat(seat, seat == last, int(cars[seat]), share(seat)) for seat in range(last + 1))
 
 
 def wilson(hits: int, count: int) -> Measure:

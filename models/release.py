@@ -6,11 +6,7 @@ copied from the training log.
 
 from __future__ import annotations
 
-import json
-import subprocess
-from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from models import card
@@ -19,16 +15,16 @@ from models.evaluate import Question, evaluate
 from models.interpret.summary import interpret, summary
 from models.policies import bundle, scripted
 from models.policies.bundle import Manifest, PolicyBundle
-from models.policies.recurrent import Architecture, RecurrentPolicy
 from models.policies.team import Team
-from models.training import checkpoint, config
+from models.training import held
+from models.training.held import Provenance, Run, RunError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from models.envs.api import Environment
     from models.policies.api import Policy
-    from models.training import Recipe
 
-RECIPE, PROVENANCE = "recipe.toml", "provenance.json"
 SEED = 7
 EPISODES = 5_000
 TOKENS_MAX = {"parent_child": 9}
@@ -41,35 +37,6 @@ BASELINES = {
 
 class ReleaseError(Exception):
     """The run cannot be released. One line: what is wrong and what to do."""
-
-
-@dataclass(frozen=True, slots=True)
-class Provenance:
-    """Where weights come from; written when training starts."""
-
-    git_commit: str
-
-    @classmethod
-    def here(cls) -> Provenance:
-        """The commit of this source tree; `unknown` outside a git checkout."""
-        command = ["git", "-C", str(Path(__file__).parent), "rev-parse", "HEAD"]
-        try:
-            done = subprocess.run(command, capture_output=True, text=True, check=True)  # noqa: S603 (fixed words)
-        except (OSError, subprocess.CalledProcessError):
-            return cls("unknown")
-        return cls(done.stdout.strip())
-
-    @classmethod
-    def read(cls, folder: Path) -> Provenance:
-        """Read what `write` left in a run's folder."""
-        path = folder / PROVENANCE
-        if not path.exists():
-            return cls("unknown")
-        return cls(**json.loads(path.read_text(encoding="utf-8")))
-
-    def write(self, folder: Path) -> None:
-        content = json.dumps({"git_commit": self.git_commit}) + "\n"
-        (folder / PROVENANCE).write_text(content, encoding="utf-8")
 
 
 def release(
@@ -118,33 +85,17 @@ def _plain(measures: dict[str, Any]) -> dict[str, Any]:
     return {name: measure.to_json() for name, measure in measures.items()}
 
 
-@dataclass(frozen=True, slots=True)
-class FinishedRun:
-    """What training left: the recipe, its best policy, environment steps."""
-
-    recipe: Recipe
-    policy: RecurrentPolicy
-    steps: int
-
-
-def _finished(run_dir: Path) -> FinishedRun:
-    if not (run_dir / RECIPE).exists():
-        raise ReleaseError(f"{run_dir}: not the folder of a run (no {RECIPE}); make one with hatlab train")
-    if not (run_dir / checkpoint.FILE).exists():
-        raise ReleaseError(f"{run_dir}: nothing was trained yet; run hatlab train --resume")
-    recipe, held = config.load(run_dir / RECIPE), checkpoint.read(run_dir)
-    if not held.facts["finished"]:
-        raise ReleaseError(f"{run_dir}: training is not finished; run hatlab train --resume")
-    env, sizes = registry.make(recipe.task), recipe.model.model_dump()
-    architecture = Architecture(observation_size=env.observation_size, actions=env.actions, **sizes)
+def _finished(run_dir: Path) -> Run:
     try:
-        policy = RecurrentPolicy.from_weights(architecture, checkpoint.part_of(held.tensors, "best."))
-    except ValueError as error:
-        raise ReleaseError(f"{run_dir}: {error}; its checkpoint is of another recipe") from None
-    return FinishedRun(recipe, policy, int(held.facts["at"]["steps"]))
+        run = held.read(run_dir)
+    except RunError as error:
+        raise ReleaseError(str(error)) from None
+    if not run.finished:
+        raise ReleaseError(f"{run_dir}: training is not finished; run hatlab train --resume")
+    return run
 
 
-def _manifest(run: FinishedRun, name: str, provenance: Provenance) -> Manifest:
+def _manifest(run: Run, name: str, provenance: Provenance) -> Manifest:
     recipe = run.recipe
     sizes = run.policy.architecture.to_dict()
     channel, gate = sizes.pop("channel"), sizes.pop("gate")

@@ -194,7 +194,9 @@ class Recipe(_Strict):
     warm_start: str | None = None
     """What the weights are started from besides chance, in words, for manifest and card."""
     init_from: str | None = None
-    """Bundle whose weights are the start; a gate that it lacks starts open."""
+    """Whose weights are the start: a bundle, or ``run:easy-fixed-proto`` for the run of that recipe with the
+    same seed, in the folder beside this one. A gate that it lacks starts open, a codebook is made by k-means.
+    """
     model: Model = Model()
     start: Start = Start()
     decoder: Decoder = Decoder()

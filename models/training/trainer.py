@@ -28,6 +28,7 @@ from models.training.checks import Checked, calibrate, check
 from models.training.config import Phase, Recipe
 from models.training.curriculum import Progress, between, same_regime
 from models.training.enforcer import Enforcer
+from models.training.held import ANCESTOR, RunError, ancestor
 from models.training.overrides import Overrides
 from models.training.quantise import head_start, kmeans, revived
 from models.training.reinforce import Learner, gradient_loss, shares
@@ -58,6 +59,7 @@ class Trainer:
         self.best: dict[str, Tensor] = {}
         self.best_score = float("-inf")
         self.status = recipe.name
+        self._codebook_due = False  # inherited weights without one: the first discrete phase builds it
         self._uses = torch.zeros(recipe.model.tokens, dtype=torch.int64)
         self._seconds = 0.0
         self._losses: dict[str, float] = {}
@@ -88,21 +90,29 @@ class Trainer:
             csv.writer(file).writerow(COLUMNS)
 
     def _inherit(self, name: str) -> None:
-        """Take the weights of a released bundle; a gate that it lacks begins open."""
-        try:
-            source = bundle.load(self.bundles / name).policy
-        except bundle.BundleError as error:
-            raise TrainingError(f"init_from {name}: {error}; train that recipe first") from None
-        assert isinstance(source, RecurrentPolicy)
+        """Take the weights of a bundle or run; channel and gate may begin anew, such a gate open."""
+        weights = self._ancestor(name)
         own = self.learner.net.state_dict()
-        weights = source.weights()
         odd = [key for key, value in own.items() if key in weights and weights[key].shape != value.shape]
-        if odd or set(weights) - set(own):
+        anew = {key for key in own if key.startswith(("channel.", "gate."))}
+        if odd or set(weights) - set(own) or set(own) - set(weights) - anew:
             raise TrainingError(f"init_from {name}: its sizes are not those of [model]")
         self.learner.net.load_state_dict(own | weights)
+        self._codebook_due = "channel.codebook" in set(own) - set(weights)
         if self.learner.net.gate is not None and "gate.bias" not in weights:
             torch.nn.init.zeros_(self.learner.net.gate.weight)
             torch.nn.init.constant_(self.learner.net.gate.bias, 1.0)
+
+    def _ancestor(self, name: str) -> dict[str, Tensor]:
+        """Weights of a bundle, or of ``run:recipe``, that recipe's run with the same seed."""
+        try:
+            if name.startswith(ANCESTOR):
+                return ancestor(self.folder, name, self.recipe.seed).policy.weights()
+            source = bundle.load(self.bundles / name).policy
+        except (bundle.BundleError, RunError, checkpoint.CheckpointError) as error:
+            raise TrainingError(f"init_from {name}: {error}; train that recipe first") from None
+        assert isinstance(source, RecurrentPolicy)
+        return source.weights()
 
     def _enter(self) -> None:
         """Begin the phase at hand: codebook, optimiser, controller."""
@@ -110,7 +120,7 @@ class Trainer:
         before = self.recipe.phase[self.at.phase - 1] if self.at.phase else None
         if before is not None and not same_regime(self.recipe, self.at.phase - 1, self.at.phase):
             self.best, self.best_score = {}, float("-inf")
-        if before is not None and phase.discrete and not before.discrete:
+        if phase.discrete and (self._codebook_due if before is None else not before.discrete):
             self._build_codebook()
         self.optimiser = torch.optim.Adam(self.learner.parameters(), lr=phase.lr)
         budget = phase.budget if phase.gate == "enforced" else None

@@ -5,7 +5,8 @@ import pytest
 
 from models import training
 from models.policies import bundle
-from models.release import Provenance, ReleaseError, release
+from models.release import ReleaseError, release
+from models.training.held import Provenance
 
 RECIPE = """
 name = "parent_child/short-9"
