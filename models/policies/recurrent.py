@@ -1,11 +1,12 @@
 """The recurrent communicating policy: encoder, first LSTM, message and gate, second LSTM, heads.
 
-    observation -> encoder -> LSTM 1 -> message, gate          (``speak``)
-    inbox, LSTM 1 -> LSTM 2 -> action, value                   (``act``)
+    observation -> encoder -> LSTM 1 -> message; gate, from LSTM 2's last state too     (``speak``)
+    inbox, LSTM 1 -> LSTM 2 -> action, value                                             (``act``)
 
-Message and gate are made from [hidden 1, encoded observation], the heads read [hidden 2, inbox, encoded
-observation] and the product of two linear maps of inbox and encoded observation: "is my next cell among
-theirs" is a match, which no linear head can see. Shapes: R rows (living agents), O observation, H hidden, D
+The message is made from [hidden 1, encoded observation]. The gate reads hidden 2 of the last step as well,
+which knows what was heard: "somebody new, who needs to hear of me" (docs/adr/0017). The heads read [hidden 2,
+inbox, encoded observation] and the product of two linear maps of inbox and encoded observation: "is my next
+cell among theirs" is a match, which no linear head can see. Shapes: R rows (living agents), O observation, H hidden, D
 message, K tokens, A actions.
 """
 
@@ -124,7 +125,11 @@ class RecurrentNet(nn.Module):
         self.encoder = Encoder(a.observation_size, hidden)
         self.first = nn.LSTMCell(hidden, hidden)
         self.speech = nn.Sequential(nn.Linear(2 * hidden, hidden), nn.ReLU(), nn.Linear(hidden, a.message))
-        self.gate = nn.Linear(2 * hidden, 1) if a.gate == "learned" else None
+        self.gate = (
+            nn.Sequential(nn.Linear(3 * hidden, hidden), nn.ReLU(), nn.Linear(hidden, 1))
+            if a.gate == "learned"
+            else None
+        )
         self.channel = make_channel(a.channel, a.tokens, a.message)
         self.second = nn.LSTMCell(hidden + a.message, hidden)
         self.match_inbox = nn.Linear(a.message, hidden)
@@ -157,7 +162,7 @@ class RecurrentNet(nn.Module):
         if self.architecture.channel != "one-hot":
             raw = torch.tanh(raw)
         token, message, loss = self._utter(raw, draws, discrete)
-        logit = self._gate_logit(source)
+        logit = self._gate_logit(torch.cat((source, memory.hidden2), 1))
         gate = (
             torch.ones_like(logit)
             if self.gate is None

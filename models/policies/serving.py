@@ -51,7 +51,7 @@ class ServingPolicy:
         self._join = layer(net.encoder.join)
         self._first, self._second = recurrent(net.first), recurrent(net.second)
         self._talk = layer(net.speech[0])
-        self._gate = None if net.gate is None else layer(net.gate)
+        self._gate = None if net.gate is None else (layer(net.gate[0]), layer(net.gate[2]))
         self._word = layer(net.speech[2])
         self._inbox, self._own = layer(net.match_inbox), layer(net.match_own)
         self._think, self._choose = layer(net.head[0]), layer(net.head[2])
@@ -73,7 +73,7 @@ class ServingPolicy:
         source = np.concatenate((hidden1, encoded), 1)  # (R, 2H)
         raw = self._word(np.maximum(self._talk(source), 0))  # (R, D)
         token = self._nearest(raw)
-        gate = np.ones(len(token), np.bool_) if self._gate is None else self._gate(source)[:, 0] >= 0
+        gate = self._opens(np.concatenate((source, memory[:, 2 * width : 3 * width]), 1))
         return Speech(token, gate, self.vector(token), memory)
 
     def act(
@@ -93,6 +93,13 @@ class ServingPolicy:
 
     def vector(self, tokens: NDArray[np.int32]) -> Floats:
         return self.policy.vector(tokens)
+
+    def _opens(self, known: Floats) -> NDArray[np.bool_]:
+        if self._gate is None:
+            return np.ones(len(known), np.bool_)
+        weigh, decide = self._gate
+        opens: NDArray[np.bool_] = decide(np.maximum(weigh(known), 0))[:, 0] >= 0
+        return opens
 
     def _nearest(self, raw: Floats) -> NDArray[np.int32]:
         near = raw if self._one_hot else 2 * np.tanh(raw) @ self._codebook - self._squares

@@ -13,7 +13,7 @@ from models.policies.team import Team
 from models.training.config import Check, Phase
 from models.training.situations import check_seeds
 
-OVER_BUDGET = 2.0  # score lost per message rate above budget + tolerance
+OFF_BUDGET = 2.0  # score lost per message rate away from the budget, beyond the tolerance
 TOLERANCE = 0.01
 HALVINGS = 6  # of the interval in which the gate's threshold is looked for: to 6 / 2**6 = .1 in the logit
 REACH = 3.0  # largest move of the threshold, in the logit
@@ -55,7 +55,7 @@ def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Chec
         score = (1 - settings.human_weight) * score + settings.human_weight * (human + arrived) / 2
         rates.append(human_rate)
     if phase.budget is not None:
-        score -= OVER_BUDGET * sum(max(0.0, rate - phase.budget - TOLERANCE) for rate in rates)
+        score -= OFF_BUDGET * sum(max(0.0, abs(rate - phase.budget) - TOLERANCE) for rate in rates)
     used = len(np.unique(played.tokens[played.gates]))
     return Checked(success, human, arrived, steps, rates[0], human_rate, used, score)
 
@@ -67,7 +67,8 @@ def calibrate(env: Environment[Any], net: RecurrentNet, budget: float, settings:
     Where a gate is open with probability .4 it is drawn open two times in five, but greedily never. The most
     talkative threshold is taken at which neither episodes from ``init`` nor human trials exceed the budget.
     """
-    gate = net.gate
+    assert net.gate is not None
+    gate = net.gate[-1]
     assert isinstance(gate, nn.Linear)
     before = gate.bias.clone()
     low, high = -REACH, REACH

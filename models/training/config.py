@@ -150,6 +150,8 @@ class Phase(_Strict):
     """Reinforce only: weight of the imitation loss kept beside the policy gradient."""
     brake_weight: Annotated[float, Field(gt=0)] = 1.0
     """Imitation: weight of steps at which the rule brakes."""
+    careful: bool = True
+    """Imitation: the rule keeps a free cell ahead, as it must where people drive."""
     rule_share: Share = 0.0
     """Imitation: share of episodes driven by the rule at the start of the phase, falling to none at its
     middle.

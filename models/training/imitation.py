@@ -1,14 +1,14 @@
-"""Labels for the warm start in Traffic Junction: front car first, with caution.
+"""Labels for the warm start in Traffic Junction: front car first, careful or not.
 
 The rule sees every car; the learner sees only itself and hears the others, visits its own states and is told
 there what the rule would do. Messages are learned through the listeners' gradient. Nobody is ever served the
 rule.
 
-A car brakes if its next cell is taken now, even if that car will probably leave it: people brake when they
-like, and whoever follows too closely hits them. Two exceptions: on the entry cell, where another car may
-appear on it, and while the junction is full, which would lock. It also brakes if a car of higher rank enters
-the same cell, or if its next cell is held by a car that brakes. Rank: inside a junction first, then further
-along the route, then the lower route.
+A car brakes if a car of higher rank enters the same cell, or if its next cell is held by a car that brakes.
+Rank: inside a junction first, then further along the route, then the lower route. Where people drive too, the
+rule is careful: a car brakes if its next cell is taken at all, even if that car will probably leave it, since
+people brake when they like, and whoever follows too closely hits them. Two exceptions: on the entry cell,
+where another car may appear on it, and while the junction is full, which would lock.
 """
 
 import numpy as np
@@ -21,7 +21,7 @@ Ints = NDArray[np.int32]
 LOCK = 4  # cars inside, each in front of the next, that would wait for each other: the cells of a crossing
 
 
-def labels(env: TrafficJunction, state: TrafficState) -> Ints:
+def labels(env: TrafficJunction, state: TrafficState, *, careful: bool = True) -> Ints:
     """Return what the rule would do (B, N); BRAKE for empty slots."""
     here = env.cell_of(state)
     ahead = intent(env, state)
@@ -33,8 +33,8 @@ def labels(env: TrafficJunction, state: TrafficState) -> Ints:
     holds = pair & (ahead[:, :, None] == here[:, None, :])
     yields = pair & (ahead[:, :, None] == ahead[:, None, :]) & (rank[:, None, :] > rank[:, :, None])
     locked = inside & (inside.sum(1, keepdims=True) >= LOCK)
-    careful = holds.any(2) & (position > 0) & ~locked
-    moving = state.alive & ~careful
+    too_close = holds.any(2) & (position > 0) & ~locked & careful
+    moving = state.alive & ~too_close
     while True:
         still = moving & ~((yields & moving[:, None, :]) | (holds & ~moving[:, None, :])).any(2)
         if (still == moving).all():

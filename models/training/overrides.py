@@ -17,7 +17,7 @@ class Overrides:
     """The overrides of one update; collects the rule's actions on the way, as labels."""
 
     def __init__(self, env: Any, recipe: Recipe, phase: Phase, at: Progress, update: int) -> None:
-        self._env, self._recipe = env, recipe
+        self._env, self._recipe, self._careful = env, recipe, phase.careful
         self.labels: list[NDArray[np.int32]] = []
         self._wants_labels = phase.kind == "imitate" or phase.imitation_weight > 0
         steps, batch = env.steps_max, phase.episodes
@@ -36,7 +36,7 @@ class Overrides:
     def __call__(self, step: int, state: Any, actions: NDArray[np.int32]) -> NDArray[np.int32]:
         assert isinstance(self._env, TrafficJunction)
         if self._wants_labels:
-            rule = labels(self._env, state)
+            rule = labels(self._env, state, careful=self._careful)
             self.labels.append(rule)
             actions = np.where(self._ruled[:, None], rule, actions)
         wobbling = self._wobbles[step] & (state.guest >= 0)

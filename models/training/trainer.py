@@ -99,9 +99,9 @@ class Trainer:
             raise TrainingError(f"init_from {name}: its sizes are not those of [model]")
         self.learner.net.load_state_dict(own | weights)
         self._codebook_due = "channel.codebook" in set(own) - set(weights)
-        if self.learner.net.gate is not None and "gate.bias" not in weights:
-            torch.nn.init.zeros_(self.learner.net.gate.weight)
-            torch.nn.init.constant_(self.learner.net.gate.bias, 1.0)
+        if self.learner.net.gate is not None and not any(key.startswith("gate.") for key in weights):
+            torch.nn.init.zeros_(self.learner.net.gate[-1].weight)
+            torch.nn.init.constant_(self.learner.net.gate[-1].bias, 1.0)
 
     def _ancestor(self, name: str) -> dict[str, Tensor]:
         """Weights of a bundle, or of ``run:recipe``, that recipe's run with the same seed."""
@@ -240,7 +240,7 @@ class Trainer:
     def _judged(self) -> RecurrentNet:
         """The policy as people would meet it; drawn gates held at a budget get their greedy threshold."""
         phase = self.phase
-        if phase.gate != "budget" or phase.budget is None or not phase.sampled:
+        if phase.gate not in ("budget", "enforced") or phase.budget is None or not phase.sampled:
             return self.learner.net
         net = copy.deepcopy(self.learner.net)
         calibrate(self.env, net, phase.budget, self.recipe.check)

@@ -25,7 +25,7 @@ def net(env):
     torch.manual_seed(3)
     net = RecurrentNet(Architecture(env.observation_size, env.actions, 12, 6, 5, "prototype", "learned"))
     with torch.no_grad():
-        net.gate.weight.mul_(4)
+        net.gate[-1].weight.mul_(4)
     return net
 
 
@@ -43,8 +43,8 @@ def test_nothing_but_the_threshold_moves_and_not_far(env, net):
     before = {name: value.clone() for name, value in net.state_dict().items()}
     calibrate(env, net, 1.0, SETTINGS)
     moved = [name for name, value in net.state_dict().items() if not torch.equal(value, before[name])]
-    assert moved == ["gate.bias"]
-    assert 0 < (net.gate.bias - before["gate.bias"]).item() <= REACH
+    assert moved == ["gate.2.bias"]
+    assert 0 < (net.gate[-1].bias - before["gate.2.bias"]).item() <= REACH
 
 
 def test_talking_over_the_budget_costs_score(env, net):

@@ -23,7 +23,7 @@ def net_for(env, channel="prototype", gate="learned", seed=0):
     net = RecurrentNet(Architecture(env.observation_size, env.actions, 10, 6, tokens, channel, gate))
     if net.gate is not None:
         with torch.no_grad():
-            net.gate.weight.mul_(8)  # so that some gates are open and some are not
+            net.gate[-1].weight.mul_(8)  # so that some gates are open and some are not
     return net
 
 
@@ -84,7 +84,7 @@ def test_a_listeners_loss_teaches_the_speaker_and_a_closed_gate_teaches_nobody()
     for gate_bias, taught in ((50.0, True), (-50.0, False)):
         net = net_for(env, "continuous")
         with torch.no_grad():
-            net.gate.bias.fill_(gate_bias)
+            net.gate[-1].bias.fill_(gate_bias)
         begin = Beginning(with_arrival(env.init(seeds(4)), 0.2), None)
         seen = unroll(env, net, begin, GREEDY, torch.Generator())
         seen.logits.square().sum().backward()
@@ -95,13 +95,13 @@ def test_the_gate_learns_from_the_listeners_even_while_it_is_closed():
     env = registry.make("traffic_junction/medium")
     net = net_for(env, "continuous")
     with torch.no_grad():
-        net.gate.weight.zero_()
-        net.gate.bias.fill_(-0.5)
+        net.gate[-1].weight.zero_()
+        net.gate[-1].bias.fill_(-0.5)
     begin = Beginning(with_arrival(env.init(seeds(4)), 0.2), None)
     seen = unroll(env, net, begin, GREEDY, torch.Generator())
     assert not seen.gate.detach().any()
     seen.logits.square().sum().backward()
-    assert net.gate.bias.grad.abs() > 0
+    assert net.gate[-1].bias.grad.abs() > 0
 
 
 def test_only_living_agents_go_through_the_network():
