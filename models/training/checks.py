@@ -15,8 +15,8 @@ from models.training.situations import check_seeds
 
 OFF_BUDGET = 2.0  # score lost per message rate away from the budget, beyond the tolerance
 TOLERANCE = 0.01
-HALVINGS = 6  # of the interval in which the gate's threshold is looked for: to 6 / 2**6 = .1 in the logit
-REACH = 3.0  # largest move of the threshold, in the logit
+HALVINGS = 7  # of the interval in which the gate's threshold is looked for: to 16 / 2**7 = .1 in the logit
+REACH = 8.0  # largest move of the threshold, in the logit: gates drawn with .9997 can be closed too
 
 
 class Checked(NamedTuple):
@@ -36,6 +36,8 @@ class Checked(NamedTuple):
     """... in human trials."""
     tokens_used: int
     """Different tokens sent, from ``init``."""
+    reward: float
+    """Summed over an episode, mean over the seats, from ``init``."""
     score: float
     """What is to be maximised."""
 
@@ -46,7 +48,9 @@ def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Chec
     played = rollout.episodes(env, team, check_seeds(settings.episodes))
     success, steps = float(played.success.mean()), float(played.steps.mean())
     human = arrived = human_rate = float("nan")
-    score = success - settings.steps_weight * steps / env.steps_max
+    reward = float(played.rewards.sum((0, 2)).mean()) / env.agents
+    score = reward if settings.score == "reward" else success
+    score -= settings.steps_weight * steps / env.steps_max
     rates = [played.message_rate]
     if settings.human:
         trial = rollout.episodes(env, team, check_seeds(settings.human), "human")
@@ -57,7 +61,7 @@ def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Chec
     if phase.budget is not None:
         score -= OFF_BUDGET * sum(max(0.0, abs(rate - phase.budget) - TOLERANCE) for rate in rates)
     used = len(np.unique(played.tokens[played.gates]))
-    return Checked(success, human, arrived, steps, rates[0], human_rate, used, score)
+    return Checked(success, human, arrived, steps, rates[0], human_rate, used, reward, score)
 
 
 @torch.no_grad()

@@ -80,6 +80,8 @@ class Check(_Strict):
     """Human trials beside them."""
     human_weight: Share = 0.5
     """Weight of the human trials in the score; the rest is the success from ``init``."""
+    score: Literal["success", "reward"] = "success"
+    """What is to be maximised; reward is summed over an episode, mean over the seats."""
     steps_weight: Weight = 0.0
     """The score loses this much for a mean episode length of ``steps_max`` (Parent & Lost Child: find
     fast).

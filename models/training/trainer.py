@@ -38,7 +38,7 @@ from models.training.unroll import Beginning, Manner, Unrolled, unroll
 LOG = "log.csv"
 COLUMNS = (
     "phase", "update", "total", "env_steps", "seconds", "lr", "loss", "parts",
-    "success", "human", "arrived", "steps", "message_rate", "human_rate", "tokens_used", "score", "best",
+    "success", "human", "arrived", "steps", "message_rate", "human_rate", "tokens_used", "reward", "score", "best",
 )  # fmt: skip
 CODEBOOK_BATCHES = 4  # unrolls from which the codebook is built: some 10,000 messages
 

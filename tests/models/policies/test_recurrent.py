@@ -99,7 +99,7 @@ def test_weights_that_do_not_fit_are_refused_by_name():
     weights = policy().weights()
     with pytest.raises(ValueError, match=r"channel\.codebook has shape \(5, 4\), not \(6, 4\)"):
         RecurrentPolicy.from_weights(replace(SMALL, tokens=6), weights)
-    with pytest.raises(ValueError, match=r"gate\.bias is missing or unknown"):
+    with pytest.raises(ValueError, match=r"gate\.0\.bias is missing or unknown"):
         RecurrentPolicy.from_weights(replace(SMALL, gate="open"), weights)
 
 

@@ -47,11 +47,21 @@ def test_nothing_but_the_threshold_moves_and_not_far(env, net):
     assert 0 < (net.gate[-1].bias - before["gate.2.bias"]).item() <= REACH
 
 
-def test_talking_over_the_budget_costs_score(env, net):
+@pytest.mark.parametrize("aside", [-0.03, 0.03])
+def test_talking_off_the_budget_costs_score_on_either_side(env, net, aside):
+    calibrate(env, net, 0.5, SETTINGS)
     free = check(env, net, Phase(name="x", gate="learned"), SETTINGS)
-    tight = check(env, net, Phase(name="x", gate="budget", budget=0.05), SETTINGS)
-    assert free.message_rate == tight.message_rate > 0.1
-    assert tight.score == pytest.approx(free.score - 2 * (free.message_rate - 0.05 - 0.01))
+    assert 0.03 < free.message_rate < 0.97
+    held = check(env, net, Phase(name="x", gate="budget", budget=free.message_rate + aside), SETTINGS)
+    assert held.message_rate == free.message_rate
+    assert held.score == pytest.approx(free.score - 2 * (abs(aside) - 0.01))
+
+
+def test_the_score_is_the_reward_where_a_recipe_says_so(env, net):
+    by_success = check(env, net, Phase(name="x"), SETTINGS)
+    by_reward = check(env, net, Phase(name="x"), Check(episodes=60, score="reward"))
+    assert by_reward.score == by_reward.reward == by_success.reward < 0
+    assert by_success.score == by_success.success
 
 
 def test_an_open_phase_is_judged_with_every_message_sent(env, net):
