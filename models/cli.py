@@ -1,6 +1,7 @@
-"""`hatlab train | evaluate | interpret | release | bundles`: the commands of the science.
+"""`hatlab train | pack | evaluate | interpret | release | bundles`: the commands of the science.
 
-Exit code 0: done; 1: a check failed (a broken bundle); 2: bad input, one line on standard error. Mounted by
+Exit code 0: done; 1: something failed on the way (a broken bundle, a loss that is not a number, a full disk);
+2: bad input. Either way one line on standard error. Mounted by
 `server.cli`, which imports this module only when one of the commands is asked for.
 """
 
@@ -69,27 +70,57 @@ def train(
         bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")
     ] = False,
     seed: Annotated[int | None, typer.Option(min=0, help="Another seed than the recipe's.")] = None,
+    checkpoint_every: Annotated[
+        int | None, typer.Option(min=1, help="Updates between checkpoints, beside those at every check.")
+    ] = None,
+    device: Annotated[str, typer.Option(help="Where to compute: cpu, cuda, cuda:1, mps, xpu.")] = "cpu",
     bundles: BundlesOption = BUNDLES,
 ) -> None:
-    """Train what a recipe describes; RUN_DIR then holds log.csv, the recipe and the checkpoint."""
+    """Train what a recipe describes; its folder then holds log, curve, recipe and checkpoint."""
     from models import training
-    from models.training.checkpoint import CheckpointError
-    from models.training.held import Provenance
+    from models.training import checkpoint, held
 
     source = _recipe_path(recipe)
     folder = out or Path("runs") / source.stem
     try:
         training.config.load(source)
-        own = _own_recipe(source, folder, seed, resume)
-        if not resume:
-            Provenance.here().write(folder)
-        result = training.run(own, folder, resume=resume, bundles=bundles)
-    except (training.RecipeError, training.TrainingError, CheckpointError) as error:
+        training.device.find(device)
+        own = _own_recipe(source, folder, seed, keep=resume or checkpoint.exists(folder))
+        if not (checkpoint.exists(folder) and (folder / held.PROVENANCE).exists()):
+            held.Provenance.here().write(folder)
+        result = training.run(
+            own, folder, resume=resume, bundles=bundles, checkpoint_every=checkpoint_every, device=device
+        )
+    except (training.StoppedError, OSError) as error:
+        _fail(error)
+    except (
+        training.RecipeError,
+        training.TrainingError,
+        training.DeviceError,
+        checkpoint.CheckpointError,
+    ) as error:
         _refuse(error)
     typer.echo(
         f"{result.updates:,} updates, {result.steps:,} environment steps, best score {result.score:.4f}"
     )
     typer.echo(f"release it with: hatlab release {folder} {result.recipe.name}")
+
+
+@app.command()
+def pack(
+    run_dir: Annotated[Path, typer.Argument(metavar="RUN_DIR", help="Folder of a hatlab train.")],
+) -> None:
+    """Pack a run's checkpoint into resume.safetensors, at most 2 MB, from which train --resume goes on."""
+    from models.training import packed
+    from models.training.checkpoint import CheckpointError
+
+    try:
+        path = packed.pack(run_dir)
+    except (packed.PackError, CheckpointError) as error:
+        _refuse(error)
+    except OSError as error:
+        _fail(error)
+    typer.echo(f"{path}: {path.stat().st_size / 1e6:.2f} MB; near to the checkpoint, not bit for bit")
 
 
 @app.command()
@@ -266,6 +297,12 @@ def _refuse(reason: object) -> NoReturn:
     raise typer.Exit(BAD_INPUT)
 
 
+def _fail(reason: object) -> NoReturn:
+    """Say in one line why what had begun stopped, and leave."""
+    typer.echo(" ".join(str(reason).split()), err=True)
+    raise typer.Exit(FAILED)
+
+
 def _numbers(text: str | None) -> tuple[int, ...] | None:
     if text is None:
         return None
@@ -284,17 +321,16 @@ def _recipe_path(recipe: str) -> Path:
     _refuse(f"{recipe}: no such file; packaged recipes: {known}")
 
 
-def _own_recipe(source: Path, folder: Path, seed: int | None, resume: bool) -> Path:
-    """Copy the recipe into the run's folder, with another seed if asked for; a resumed run keeps its own."""
+def _own_recipe(source: Path, folder: Path, seed: int | None, *, keep: bool) -> Path:
+    """Copy the recipe into the run's folder, with another seed if asked for; one to be kept stays."""
     from models.training.held import with_seed
 
     own = folder / "recipe.toml"
-    if own.exists() and resume:
+    if own.exists() and keep:
         return own
-    if (folder / "checkpoint.safetensors").exists():
-        return own  # which the trainer refuses: the folder holds a run
     folder.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(source, own)
+    if not (own.exists() and own.samefile(source)):
+        shutil.copyfile(source, own)
     if seed is not None:
         text = own.read_text(encoding="utf-8")
         own.write_text(with_seed(text, seed), encoding="utf-8")

@@ -30,7 +30,7 @@ class ContinuousChannel(nn.Module):
     """Any vector may be sent."""
 
     def forward(self, raw: Tensor) -> Utterance:
-        token = torch.full((raw.shape[0],), -1, dtype=torch.int64)
+        token = torch.full((raw.shape[0],), -1, dtype=torch.int64, device=raw.device)
         return Utterance(token, raw, raw.new_zeros(len(raw)))
 
 
@@ -38,7 +38,7 @@ class NoChannel(nn.Module):
     """Nothing can be said: messages are zeros."""
 
     def forward(self, raw: Tensor) -> Utterance:
-        token = torch.full((raw.shape[0],), -1, dtype=torch.int64)
+        token = torch.full((raw.shape[0],), -1, dtype=torch.int64, device=raw.device)
         return Utterance(token, torch.zeros_like(raw), raw.new_zeros(len(raw)))
 
 

@@ -1,7 +1,8 @@
 """Training: ``run(recipe, folder)`` follows a recipe and returns the best policy."""
 
 from models.training.config import Recipe, RecipeError
+from models.training.device import DeviceError
 from models.training.run import TrainingResult, run
-from models.training.trainer import TrainingError
+from models.training.trainer import StoppedError, TrainingError
 
-__all__ = ["Recipe", "RecipeError", "TrainingError", "TrainingResult", "run"]
+__all__ = ["DeviceError", "Recipe", "RecipeError", "StoppedError", "TrainingError", "TrainingResult", "run"]

@@ -10,10 +10,12 @@ from typing import Any, NamedTuple
 
 import torch
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
+from safetensors.torch import save
 from torch import Tensor
 
 FILE = "checkpoint.safetensors"
+PACKED = "resume.safetensors"
+"""A checkpoint made small enough to be committed; see ``models.training.packed``."""
 
 
 class CheckpointError(Exception):
@@ -28,16 +30,32 @@ class Checkpoint(NamedTuple):
 
 
 def write(folder: Path, tensors: dict[str, Tensor], facts: dict[str, Any]) -> Path:
+    """Replace the checkpoint of a run's folder.
+
+    Raises:
+        OSError: the disk is full or broken; the old checkpoint is still there, whole.
+    """
+    return store(folder / FILE, serialised(tensors, facts))
+
+
+def serialised(tensors: dict[str, Tensor], facts: dict[str, Any]) -> bytes:
+    """One safetensors file."""
+    whole = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
+    return save(whole, {"facts": json.dumps(facts)})
+
+
+def store(path: Path, content: bytes) -> Path:
     """Write, force to disk, then take the old one's place: a kill at any moment leaves a whole file."""
-    path, new = folder / FILE, folder / (FILE + ".new")
-    save_file(
-        {name: tensor.contiguous().clone() for name, tensor in tensors.items()},
-        new,
-        {"facts": json.dumps(facts)},
-    )
-    with new.open("rb") as file:
-        os.fsync(file.fileno())
-    new.replace(path)
+    new = path.with_name(path.name + ".new")
+    try:
+        with new.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        new.replace(path)
+    except OSError:
+        new.unlink(missing_ok=True)  # a part of a file is of no use, and its room may be needed
+        raise
     return path
 
 
@@ -47,7 +65,11 @@ def read(folder: Path) -> Checkpoint:
     Raises:
         CheckpointError: it is missing or damaged.
     """
-    path = folder / FILE
+    return load(folder / FILE)
+
+
+def load(path: Path) -> Checkpoint:
+    """Read one file; see ``read``."""
     try:
         with safe_open(path, "pt") as file:
             facts = json.loads((file.metadata() or {})["facts"])
@@ -56,6 +78,16 @@ def read(folder: Path) -> Checkpoint:
         raise CheckpointError(f"{path}: missing; start the run without resuming") from None
     except (SafetensorError, KeyError, ValueError) as error:
         raise CheckpointError(f"{path}: damaged ({error})") from None
+
+
+def exists(folder: Path) -> bool:
+    """Whether the folder holds a run, packed or not."""
+    return any((folder / name).exists() for name in (FILE, PACKED))
+
+
+def discard_resume(folder: Path) -> None:
+    """Remove the packed checkpoint of a run that needs it no longer."""
+    (folder / PACKED).unlink(missing_ok=True)
 
 
 def optimiser_tensors(optimiser: torch.optim.Adam) -> dict[str, Tensor]:

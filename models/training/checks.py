@@ -30,14 +30,14 @@ class Checked(NamedTuple):
     """Share of human trials in which the participant's car arrived."""
     steps: float
     """Mean length of the episodes from ``init``."""
+    reward: float
+    """Summed over each of them, mean over the seats."""
     message_rate: float
     """Messages per living agent and step, from ``init``."""
     human_rate: float
     """... in human trials."""
     tokens_used: int
     """Different tokens sent, from ``init``."""
-    reward: float
-    """Summed over an episode, mean over the seats, from ``init``."""
     score: float
     """What is to be maximised."""
 
@@ -47,8 +47,8 @@ def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Chec
     team = Team(env, RecurrentPolicy(net, phase.discrete, phase.gate == "open"))
     played = rollout.episodes(env, team, check_seeds(settings.episodes))
     success, steps = float(played.success.mean()), float(played.steps.mean())
+    reward = float(played.rewards.sum(axis=(0, 2), dtype=np.float64).mean()) / env.agents
     human = arrived = human_rate = float("nan")
-    reward = float(played.rewards.sum((0, 2)).mean()) / env.agents
     score = reward if settings.score == "reward" else success
     score -= settings.steps_weight * steps / env.steps_max
     rates = [played.message_rate]
@@ -61,7 +61,7 @@ def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Chec
     if phase.budget is not None:
         score -= OFF_BUDGET * sum(max(0.0, abs(rate - phase.budget) - TOLERANCE) for rate in rates)
     used = len(np.unique(played.tokens[played.gates]))
-    return Checked(success, human, arrived, steps, rates[0], human_rate, used, reward, score)
+    return Checked(success, human, arrived, steps, reward, rates[0], human_rate, used, score)
 
 
 @torch.no_grad()

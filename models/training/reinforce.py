@@ -85,7 +85,7 @@ def gradient_loss(
     if labels is not None:
         weight = phase.policy_weight if phase.kind == "imitate" else phase.imitation_weight
         parts["imitation"] = weight * imitation_loss(
-            seen.logits, torch.from_numpy(labels), phase.brake_weight
+            seen.logits, torch.from_numpy(labels).to(seen.logits.device), phase.brake_weight
         )
     if learner.decoder is not None and phase.decoder_weight:
         parts["decoder"] = phase.decoder_weight * similarity_loss(env, learner.decoder, seen)
@@ -106,8 +106,8 @@ def _policy_parts(
     value = learner.critic(seen.features).squeeze(1)
     baseline = value.detach()
     rewards = shaped(env, seen, phase, enforcer)
-    each = advantages(rewards, grid(baseline.numpy(), seen), seen.continues, phase.gamma, phase.lam)
-    raw = torch.from_numpy(each.reshape(len(rewards), -1)[seen.step, seen.place])  # (M,)
+    each = advantages(rewards, grid(baseline.cpu().numpy(), seen), seen.continues, phase.gamma, phase.lam)
+    raw = torch.from_numpy(each.reshape(len(rewards), -1)[seen.step, seen.place]).to(value.device)  # (M,)
     advantage = (raw - raw.mean()) / (raw.std() + 1e-6)
     log = seen.logits.log_softmax(1)
     chosen = log.gather(1, seen.action.unsqueeze(1)).squeeze(1)
@@ -196,7 +196,7 @@ def shares(seen: Unrolled) -> NDArray[np.float64]:
     """(B,) messages sent per living agent and step in each episode."""
     seats = seen.living.shape[2]
     batch = seen.living.shape[1]
-    sent = np.bincount(seen.place // seats, weights=seen.gate.detach().numpy(), minlength=batch)
+    sent = np.bincount(seen.place // seats, weights=seen.gate.detach().cpu().numpy(), minlength=batch)
     return np.asarray(sent / np.maximum(seen.living.sum((0, 2)), 1))
 
 

@@ -1,5 +1,6 @@
 """Follow a recipe from the first update to the best policy."""
 
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,12 +10,16 @@ from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemaini
 from rich.progress import Progress as Bar
 
 from models.policies.recurrent import RecurrentPolicy
-from models.training import config
+from models.training import config, curve, log
 from models.training.allocation import keep_freed_memory
 from models.training.config import Recipe
+from models.training.device import find
 from models.training.trainer import Trainer
 
 PACKAGED = Path(__file__).parent.parent / "bundles"
+CURVE_EVERY_S = 300.0
+"""Least time between two drawings of the curve: each takes half a second, which a run should not feel."""
+READINGS = {"success": "success", "rate": "message_rate", "entropy": "entropy", "decoder": "decoder"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +33,13 @@ class TrainingResult:
     updates: int
     steps: int
     """Environment steps trained on."""
+    seconds: float
+    """Wall time, over all resumptions."""
+    cpu_s: float
+    """Processor time, over all resumptions, checks included."""
     folder: Path
+    log: Path
+    """A line per check; see ``models.training.log``."""
 
 
 def run(
@@ -37,38 +48,77 @@ def run(
     resume: bool = False,
     progress: bool = True,
     bundles: Path | str | None = None,
+    checkpoint_every: int | None = None,
+    device: str = "cpu",
 ) -> TrainingResult:
     """Train what a recipe describes.
 
     Args:
         recipe_path: TOML file.
         out_dir: folder of the run.
-        resume: go on from the folder's checkpoint if there is one.
+        resume: go on from the folder's checkpoint, or from a packed one, if there is one.
         progress: draw a progress bar on standard error.
         bundles: where ``init_from`` is looked up; the packaged bundles if absent.
+        checkpoint_every: updates between checkpoints, beside those at every check.
+        device: where the network is, and what it computes.
 
     Raises:
         RecipeError: the recipe is wrong.
-        TrainingError: the folder holds another run, the start is missing, or the loss is not finite.
+        DeviceError: there is no such device.
+        TrainingError: the folder holds another run, or the start is missing.
+        StoppedError: the loss is not finite, or the disk is full; the last good checkpoint is whole.
         CheckpointError: the checkpoint is damaged.
     """
     recipe = config.load(recipe_path)
     torch.set_num_threads(1)
     keep_freed_memory()
-    trainer = Trainer(recipe, Path(out_dir), Path(bundles) if bundles else PACKAGED)
+    root = Path(bundles) if bundles else PACKAGED
+    trainer = Trainer(recipe, Path(out_dir), root, checkpoint_every, find(device))
     trainer.open(resume)
-    with _bar(progress) as bar:
-        task = bar.add_task(
-            recipe.name, total=sum(p.updates for p in recipe.phase), completed=trainer.at.total
-        )
-        while not trainer.finished:
-            trainer.advance()
-            bar.update(task, completed=trainer.at.total, description=trainer.status)
+    _follow(trainer, progress)
     return TrainingResult(
-        recipe, trainer.best_policy(), trainer.best_score, trainer.at.total, trainer.at.steps, trainer.folder
+        recipe,
+        trainer.best_policy(),
+        trainer.best_score,
+        trainer.at.total,
+        trainer.at.steps,
+        trainer.clock.seconds,
+        trainer.clock.cpu_s,
+        trainer.folder,
+        trainer.folder / log.FILE,
     )
 
 
+def _follow(trainer: Trainer, progress: bool) -> None:
+    """Advance to the end, showing how it goes; the curve is drawn now and then, and whatever happens."""
+    drawn = time.monotonic()
+    with _bar(progress) as bar:
+        updates = sum(phase.updates for phase in trainer.recipe.phase)
+        task = bar.add_task(_status(trainer), total=updates, completed=trainer.at.total)
+        try:
+            while not trainer.finished:
+                trainer.advance()
+                bar.update(task, description=_status(trainer), completed=trainer.at.total)
+                if trainer.just_checked and time.monotonic() - drawn > CURVE_EVERY_S:
+                    curve.draw(trainer.folder, trainer.recipe)
+                    drawn = time.monotonic()
+        finally:
+            curve.draw(trainer.folder, trainer.recipe)
+
+
 def _bar(shown: bool) -> Bar:
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(10),  # two lines of text, bar, count and time fit into 80 columns
+        MofNCompleteColumn(),
+        TimeRemainingColumn(compact=True),
+    )
     return Bar(*columns, console=Console(stderr=True), disable=not shown)
+
+
+def _status(trainer: Trainer) -> str:
+    """Where the run is, and under it what it has reached."""
+    phase = "done" if trainer.finished else trainer.phase.name
+    values = {label: getattr(trainer.readings, name) for label, name in READINGS.items()}
+    shown = [f"{label} {'–' if value is None else format(value, '.3f')}" for label, value in values.items()]
+    return f"{trainer.recipe.name}: {phase}\n{'  '.join(shown)}"

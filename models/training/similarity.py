@@ -61,13 +61,13 @@ def similarity_loss(env: Environment[Any], reader: Reader, seen: Unrolled) -> Te
     """Mean loss over the rows that listen: cross-entropy in nats (summed over cells), or squared error."""
     if reader.settings.target == "occupancy":
         assert isinstance(env, TrafficJunction)
-        target = torch.from_numpy(occupancy(env, seen))
+        target = torch.from_numpy(occupancy(env, seen)).to(seen.hidden.device)
         read = reader(seen.hidden, seen.inbox)
         return nn.functional.binary_cross_entropy_with_logits(read, target, reduction="none").sum(1).mean()
     assert env.sought is not None
     seeks = seen.place % env.agents != env.sought
     rows = torch.from_numpy(np.flatnonzero(seeks))
-    cell = torch.from_numpy(_sought_cell(env, env.sought, seen)[seeks])
+    cell = torch.from_numpy(_sought_cell(env, env.sought, seen)[seeks]).to(seen.hidden.device)
     read = reader(seen.hidden[rows], seen.inbox[rows])
     if reader.settings.target == "location":
         return nn.functional.cross_entropy(read, cell)

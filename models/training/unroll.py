@@ -95,7 +95,8 @@ class Mind:
         self.env, self.net, self.batch, self.manner = env, net, batch, manner
         self._rows = blank(net, 1)
         self._row_of = np.zeros(batch * env.agents, np.int64)
-        self._speaks = torch.from_numpy(np.tile(env.speaks, batch).astype(np.float32))
+        self.device = device_of(net)
+        self._speaks = self._place(np.tile(env.speaks, batch).astype(np.float32))
         self._held: tuple[Tensor, Tensor] | None = None
 
     def remember(self, memory: Memory) -> None:
@@ -106,13 +107,18 @@ class Mind:
         """What all B*N seats remember."""
         return self._recall(self._row_of)
 
+    def _place(self, array: NDArray[Any]) -> Tensor:
+        """The array where the network is."""
+        return torch.from_numpy(array).to(self.device)
+
     def _recall(self, row: NDArray[np.int64]) -> Memory:
         """The rows of the last step; zeros for -1."""
-        known = torch.from_numpy(row >= 0)
-        index = torch.from_numpy(np.maximum(row, 0))
+        known = row >= 0
+        index = self._place(np.maximum(row, 0))
         parts = [part.index_select(0, index) for part in self._rows]
         if not known.all():
-            parts = [part * known.unsqueeze(1) for part in parts]
+            mask = self._place(known).unsqueeze(1)
+            parts = [part * mask for part in parts]
         return Memory(*parts)
 
     def speak(
@@ -122,21 +128,21 @@ class Mind:
         place = np.flatnonzero(living)
         row = np.where(self.env.fresh(state).reshape(-1)[place], FORGOTTEN, self._row_of[place])
         observation = self.env.observe(state).reshape(-1, self.env.observation_size)[place]
-        draws = torch.rand(len(place), 2, generator=generator) if generator is not None else None
+        draws = None if generator is None else torch.rand(len(place), 2, generator=generator).to(self.device)
         said = self.net.speak(
             self._recall(row),
-            torch.from_numpy(observation),
+            self._place(observation),
             draws,
             discrete=self.manner.discrete,
         )
         gate = torch.ones_like(said.gate) if self.manner.open_gate else said.gate
         if self.net.architecture.channel == "none":
             gate = torch.zeros_like(gate)
-        return place, said._replace(gate=gate * self._speaks[torch.from_numpy(place)])
+        return place, said._replace(gate=gate * self._speaks[self._place(place)])
 
     def inbox(self, place: NDArray[np.int64], said: Said) -> Tensor:
         """(R, D): mean of what each living seat receives."""
-        where = torch.from_numpy(place)
+        where = self._place(place)
         message, gate = said.message * said.gate.unsqueeze(1), said.gate
         if self.env.message_held:
             message, gate = self._hold(where, message, gate)
@@ -164,7 +170,14 @@ class Mind:
 
 def blank(net: RecurrentNet, rows: int) -> Memory:
     """Memories of newcomers."""
-    return Memory(*(torch.zeros(rows, net.architecture.hidden) for _ in Memory._fields))
+    return Memory(
+        *(torch.zeros(rows, net.architecture.hidden, device=device_of(net)) for _ in Memory._fields)
+    )
+
+
+def device_of(net: RecurrentNet) -> torch.device:
+    """Where the network is, and with it all tensors of an episode; worlds and draws are on the CPU."""
+    return net.encoder.plain.weight.device
 
 
 Override = Callable[[int, Any, Ints], Ints]
@@ -227,11 +240,11 @@ def _step(
     mind.keep(place, done.memory)
     action = _choose(done.logits, mind.manner, generator)
     actions = np.zeros(living.size, np.int32)
-    actions[place] = action.numpy()
+    actions[place] = action.cpu().numpy()
     grid = actions.reshape(living.shape)
     if override is not None:
         grid = override(step, state, grid)
-        action = torch.from_numpy(grid.reshape(-1)[place].astype(np.int64))
+        action = torch.from_numpy(grid.reshape(-1)[place].astype(np.int64)).to(mind.device)
     at = np.full(len(place), step)
     return grid, _Rows(at, place, said, done.logits, action, done.features, inbox)
 
@@ -241,14 +254,14 @@ def _choose(logits: Tensor, manner: Manner, generator: torch.Generator) -> Tenso
     if not manner.sampled and not manner.explore:
         return detached.argmax(1)
     if manner.sampled:
-        uniform = torch.rand(detached.shape, generator=generator).clamp(min=1e-9)
+        uniform = torch.rand(detached.shape, generator=generator).clamp(min=1e-9).to(detached.device)
         chosen = (detached - (-uniform.log()).log()).argmax(1)  # Gumbel's way to draw from softmax
     else:
         chosen = detached.argmax(1)
     if manner.explore:
         stray = torch.rand(len(chosen), generator=generator) < manner.explore
         other = torch.randint(0, detached.shape[1], chosen.shape, generator=generator)
-        chosen = torch.where(stray, other, chosen)
+        chosen = torch.where(stray.to(chosen.device), other.to(chosen.device), chosen)
     return chosen
 
 
@@ -304,5 +317,5 @@ def warmed_up(
         )
         done = net.act(said.memory, said.encoded, mind.inbox(place, said))
         for kept, after in zip(memory, done.memory, strict=True):
-            kept[torch.from_numpy(place)] = after
+            kept[torch.from_numpy(place).to(kept.device)] = after
     return memory
