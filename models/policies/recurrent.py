@@ -1,13 +1,13 @@
 """The recurrent communicating policy: encoder, first LSTM, message and gate, second LSTM, heads.
 
-    observation -> encoder -> LSTM 1 -> message; gate, from LSTM 2's last state too     (``speak``)
-    inbox, LSTM 1 -> LSTM 2 -> action, value                                             (``act``)
+    observation -> encoder -> LSTM 1 -> message; gate, with LSTM 2's last state      (``speak``)
+    inbox, LSTM 1 -> LSTM 2 -> action, value                                         (``act``)
 
 The message is made from [hidden 1, encoded observation]. The gate reads hidden 2 of the last step as well,
 which knows what was heard: "somebody new, who needs to hear of me" (docs/adr/0017). The heads read [hidden 2,
 inbox, encoded observation] and the product of two linear maps of inbox and encoded observation: "is my next
-cell among theirs" is a match, which no linear head can see. Shapes: R rows (living agents), O observation, H hidden, D
-message, K tokens, A actions.
+cell among theirs" is a match, which no linear head can see. Shapes: R rows (living agents), O observation, H
+hidden, D message, K tokens, A actions.
 """
 
 from collections.abc import Mapping
