@@ -47,6 +47,7 @@ def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Chec
     success, steps = float(played.success.mean()), float(played.steps.mean())
     human = arrived = human_rate = float("nan")
     score = success - settings.steps_weight * steps / env.steps_max
+    score += settings.reward_weight * float(played.rewards.sum((0, 2)).mean()) / env.agents
     rates = [played.message_rate]
     if settings.human:
         trial = rollout.episodes(env, team, check_seeds(settings.human), "human")
