@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 TASKS = {
     "parent_child": "Parent & Lost Child: 9x9 grid, at most 20 steps; the child sends one token an episode",
+    "predator_prey": "Predator-Prey: predators look for a prey that stays; all talk at every step",
     "traffic_junction": "Traffic Junction: cars that see nobody choose gas or brake and talk at every step",
 }
 ROWS = {
@@ -22,6 +23,8 @@ ROWS = {
 }
 HOW = {
     "parent_child": "greedy; 95 % interval in brackets. Steps are 20 where the child was not found.",
+    "predator_prey": "greedy; 95 % interval in brackets. Reward is summed over the episode, mean over the "
+    "predators (the prey gets the same); success means that all predators are with the prey at the end.",
     "traffic_junction": "greedy; 95 % interval in brackets. In human trials arrived, collided and limit are "
     "those of the seat where a participant sits, driven by the policy; success means that no car at all "
     "collided in the whole episode.",
@@ -33,6 +36,7 @@ COLUMNS = {
     "collided": "collided",
     "limit": "limit",
     "success": "success",
+    "reward": "reward",
     "message_rate": "message rate",
     "tokens_used": "tokens in use",
 }
@@ -85,7 +89,7 @@ def supervised_help(recipe: dict[str, Any]) -> str:
     if any(
         phase.get("kind") == "imitate" or phase.get("imitation_weight") for phase in recipe.get("phase", ())
     ):
-        used.append("labels of a rule-based driver")
+        used.append("labels of a rule that sees everything")
     return "; ".join(used) or "none"
 
 

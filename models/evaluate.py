@@ -3,7 +3,7 @@
 What each number means:
 
 - success: share of episodes that the world calls a success.
-- reward: summed over an episode, mean over seats.
+- reward: summed over an episode, mean over seats (Predator-Prey: the predators' mean, which the prey gets).
 - message_rate: messages sent per step of a living agent that may speak; message_rate_slots: per step of a
   seat that may speak, empty ones too (what the public IC3Net code counts).
 - tokens_used: tokens in use (`models.interpret.nulls.in_use`: from 1 % of the messages on, for nine tokens;

@@ -31,6 +31,7 @@ TOKENS_MAX = {"parent_child": 9}
 """People choose among these with the digit keys."""
 BASELINES = {
     "traffic_junction": ("scripted:always-gas", "scripted:front-car-first"),
+    "predator_prey": ("scripted:random", "scripted:straight"),
     "parent_child": ("scripted:seeker", "scripted:oracle"),
 }
 

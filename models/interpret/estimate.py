@@ -2,6 +2,7 @@
 
 Traffic Junction: human-trial starts, the policy in every seat; counted is what the participant's seat would
 hear while its trial lasts. Parent & Lost Child: random starts; the child's one message of each episode.
+Predator-Prey: random starts; every message of every seat.
 
 Shapes: T steps, B episodes, N seats, K tokens, C cells.
 """
@@ -31,7 +32,7 @@ ESTIMATION, HELD_OUT, EVALUATION = 201, 202, 203
 """Streams of episode seeds: what is estimated on one is never judged on the same episodes."""
 
 BATCH = 500
-EPISODES = {"traffic_junction": 2_000, "parent_child": 20_000}
+EPISODES = {"traffic_junction": 2_000, "predator_prey": 2_000, "parent_child": 20_000}
 """Episodes of a lexicon: enough to see every cell often (a search gives one message, a trial hundreds)."""
 
 
@@ -76,7 +77,7 @@ def seed_batches(count: int, seed: int, stream: int, batch: int = BATCH) -> Iter
 def hearable(env: Environment[Any], rollout: Rollout) -> NDArray[np.bool_]:
     """Return which messages (T, B, N) a person would hear: sent by others, gate open, while the trial lasts.
 
-    A message that is held for the whole episode counts once.
+    A message that is held for the whole episode counts once. Where no person plays, all that are sent.
     """
     sent = rollout.gates & rollout.alive
     if env.message_held:

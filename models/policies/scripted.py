@@ -15,6 +15,7 @@ from models import rng
 from models.envs.api import Environment, Ints
 from models.envs.grid import MOVES, STAY, towards
 from models.envs.parent_child import ParentChild, ParentChildState
+from models.envs.predator_prey import PredatorPrey
 from models.envs.right_of_way import right_of_way
 from models.envs.traffic_junction import GAS, TrafficJunction
 
@@ -105,12 +106,35 @@ class Oracle:
         return _with_child(_towards_child(state))
 
 
+class Straight:
+    """Predators that know where the prey is and walk straight to it, rows first: the ceiling."""
+
+    name = "scripted:straight"
+
+    def actions(self, env: Environment[Any], state: Any) -> Ints:
+        hunt = _hunt(env, self.name)
+        cell = hunt.cell_of(state)
+        return towards(*divmod(cell, hunt.dim), *divmod(state.prey[:, None], hunt.dim))
+
+
+class StraightLate:
+    """The same from the second step on: the ceiling where messages arrive one step late."""
+
+    name = "scripted:straight-late"
+
+    def actions(self, env: Environment[Any], state: Any) -> Ints:
+        _hunt(env, self.name)
+        return np.where(state.t[:, None] == 0, np.int32(STAY), Straight().actions(env, state))
+
+
 _POLICIES: dict[str, Callable[[], Scripted]] = {
     AlwaysGas.name: AlwaysGas,
     Random.name: Random,
     FrontCarFirst.name: FrontCarFirst,
     Seeker.name: Seeker,
     Oracle.name: Oracle,
+    Straight.name: Straight,
+    StraightLate.name: StraightLate,
 }
 
 NAMES: tuple[str, ...] = tuple(_POLICIES)
@@ -136,6 +160,12 @@ def _crossing(env: Environment[Any], name: str) -> TrafficJunction:
 def _search(env: Environment[Any], name: str) -> ParentChild:
     if not isinstance(env, ParentChild):
         raise WrongTaskError(f"{name} searches in parent_child, it cannot play {env.name}")
+    return env
+
+
+def _hunt(env: Environment[Any], name: str) -> PredatorPrey:
+    if not isinstance(env, PredatorPrey):
+        raise WrongTaskError(f"{name} hunts in predator_prey, it cannot play {env.name}")
     return env
 
 

@@ -16,6 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from models.envs import registry
+from models.training.imitation import has_rule
 
 Share = Annotated[float, Field(ge=0, le=1)]
 Count = Annotated[int, Field(ge=1)]
@@ -151,11 +152,11 @@ class Phase(_Strict):
     imitation_weight: Weight = 0.0
     """Reinforce only: weight of the imitation loss kept beside the policy gradient."""
     brake_weight: Annotated[float, Field(gt=0)] = 1.0
-    """Imitation: weight of steps at which the rule brakes."""
+    """Imitation: weight of steps at which the rule brakes (Traffic Junction)."""
     careful: bool = True
-    """Imitation: the rule keeps a free cell ahead, as it must where people drive."""
+    """Imitation: the rule keeps a free cell ahead, as it must where people drive (Traffic Junction)."""
     rule_share: Share = 0.0
-    """Imitation: share of episodes driven by the rule at the start of the phase, falling to none at its
+    """Imitation: share of episodes played by the rule at the start of the phase, falling to none at its
     middle.
     """
     explore: Share = 0.0
@@ -215,8 +216,10 @@ class Recipe(_Strict):
         traffic = self.task.startswith("traffic_junction")
         if not traffic and (self.start != Start() or self.check.human or self._uses_traffic()):
             raise ValueError(
-                f"{self.task} has no traffic: no start, human trials, imitation or first_collision_only"
+                f"{self.task} has no traffic: no start, human trials, brake_weight or first_collision_only"
             )
+        if not has_rule(self.task) and any(p.kind == "imitate" or p.imitation_weight for p in self.phase):
+            raise ValueError(f"{self.task} has no rule to imitate")
         if (self.decoder.target == "occupancy") != traffic and self.decoder.target != "none":
             raise ValueError(f"decoder.target {self.decoder.target!r} does not fit {self.task}")
         if self.model.channel == "one-hot" and self.model.tokens != self.model.message:
@@ -228,7 +231,7 @@ class Recipe(_Strict):
         return self
 
     def _uses_traffic(self) -> bool:
-        return any(p.kind == "imitate" or p.imitation_weight or p.first_collision_only for p in self.phase)
+        return any(p.brake_weight != 1 or p.first_collision_only for p in self.phase)
 
 
 def parse(raw: dict[str, Any], source: str = "recipe") -> Recipe:

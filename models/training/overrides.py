@@ -1,11 +1,11 @@
-"""What else moves the cars in training: the rule, in its share of episodes, and a wobbling participant."""
+"""What else acts in training: the rule, in its share of episodes, and a wobbling participant."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from models.envs.traffic_junction import BRAKE, TrafficJunction
+from models.envs.traffic_junction import BRAKE
 from models.training.config import Phase, Recipe
 from models.training.curriculum import Progress, rule_share
 from models.training.imitation import labels
@@ -34,11 +34,14 @@ class Overrides:
         return rule.reshape(len(rule), -1)[seen.step, seen.place].astype(np.int64)
 
     def __call__(self, step: int, state: Any, actions: NDArray[np.int32]) -> NDArray[np.int32]:
-        assert isinstance(self._env, TrafficJunction)
         if self._wants_labels:
             rule = labels(self._env, state, careful=self._careful)
             self.labels.append(rule)
             actions = np.where(self._ruled[:, None], rule, actions)
+        return self._wobbled(step, state, actions) if self._recipe.start.wobble else actions
+
+    def _wobbled(self, step: int, state: Any, actions: NDArray[np.int32]) -> NDArray[np.int32]:
+        """Traffic Junction: the participant's car brakes now and then."""
         wobbling = self._wobbles[step] & (state.guest >= 0)
         if wobbling.any():
             actions = actions.copy()

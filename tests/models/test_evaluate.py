@@ -3,9 +3,11 @@ import pytest
 
 from models.envs import registry
 from models.evaluate import Bootstrap, Question, evaluate, wilson
+from models.interpret.estimate import EVALUATION, seed_batches
 from models.policies import scripted
 from models.policies.api import GeneratorDraws
 from models.policies.team import Team
+from models.rollout import episodes
 from tests.models.interpret.speakers import Honest
 from tests.models.policies.bundles import tiny_policy
 
@@ -36,6 +38,27 @@ def test_the_oracle_needs_six_steps_and_the_reward_follows_from_them() -> None:
     assert measured["steps"].mean == pytest.approx(6.0, abs=0.1)
     assert measured["found"].mean == measured["success"].mean == 1.0
     assert measured["reward"].mean == pytest.approx(-0.05 * (measured["steps"].mean - 2), abs=1e-6)
+
+
+@pytest.mark.parametrize("task", ["predator_prey/5x5", "predator_prey/10x10"])
+def test_the_reward_of_a_hunt_is_the_mean_over_the_predators(task: str) -> None:
+    env, rule = registry.make(task), scripted.make("scripted:random")
+    seeds = np.concatenate(list(seed_batches(700, 3, EVALUATION)))
+    played = episodes(env, rule, seeds)
+    measured = evaluate(env, rule, Question(700, seed=3))
+    predators = played.rewards[..., :-1].sum(axis=0, dtype=np.float64).mean(axis=1)  # (B,)
+
+    assert measured["reward"].mean == pytest.approx(predators.mean(), abs=1e-6)
+    assert measured["success"].mean == played.success.mean()
+    assert played.steps.tolist() == [env.steps_max] * 700
+
+
+def test_everybody_in_a_hunt_may_speak_at_every_step() -> None:
+    env = registry.make("predator_prey/5x5")
+    measured = evaluate(env, Team(env, tiny_policy(env.name)), Question(20))
+
+    assert measured["message_rate"].mean == measured["message_rate_slots"].mean == 1.0
+    assert "steps" not in measured
 
 
 def test_the_same_seed_gives_the_same_numbers_and_another_seed_others() -> None:

@@ -82,6 +82,21 @@ def test_releasing_twice_gives_the_same_files_but_for_the_date(finished: Path, t
     assert manifests[0] == manifests[1]
 
 
+def test_a_run_in_another_world_becomes_a_bundle_too(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    recipe = RECIPE.replace("parent_child/short-9", "predator_prey/short-9").format(
+        tokens=9, channel="prototype", updates=1
+    )
+    (tmp_path / "run/recipe.toml").write_text(recipe.replace('"parent_child"', '"predator_prey/5x5"'))
+    training.run(tmp_path / "run/recipe.toml", tmp_path / "run", progress=False)
+    made = release(tmp_path / "run", None, tmp_path, episodes=10, lexicon_episodes=20)
+    rows = bundle.load(tmp_path / "predator_prey/short-9").evaluation["rows"]
+    assert set(rows) == {"as_trained", "masked", "scripted:random", "scripted:straight"}
+    assert made.evaluation["meaning"]["messages"] == 20 * 20 * 4
+    card = (tmp_path / "predator_prey/short-9/CARD.md").read_text()
+    assert f" {rows['scripted:straight']['reward']['mean']:.2f} [" in card
+
+
 def test_a_one_hot_card_warns_that_places_mean_nothing(tmp_path: Path) -> None:
     folder = trained(tmp_path / "run", channel="one-hot", updates=1)
     made = release(folder, None, tmp_path / "bundles", episodes=10, lexicon_episodes=100)

@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+import torch
 
 from models.envs import registry
 from models.interpret.estimate import ESTIMATION, estimate, hearable, lives, seed_batches
@@ -48,6 +49,22 @@ def test_a_held_message_counts_once_per_episode() -> None:
     env = registry.make("parent_child")
     lexicon = estimate(env, tiny_policy(), 300, seed=2)
     assert lexicon.samples == 300
+
+
+@pytest.mark.parametrize("gate", ["open", "learned"])
+def test_in_a_hunt_every_message_that_was_sent_counts(gate: str) -> None:
+    env = registry.make("predator_prey/10x10")
+    policy = tiny_policy(env.name, gate=gate)
+    if gate == "learned":
+        with torch.no_grad():
+            policy.net.gate.bias.fill_(-0.2)  # sometimes open, sometimes closed
+    rollouts = list(lives(env, policy, 30, 2, ESTIMATION))
+    sent = sum(int(rollout.gates.sum()) for rollout in rollouts)
+
+    assert all(hearable(env, rollout).sum() == rollout.gates.sum() for rollout in rollouts)
+    assert estimate(env, policy, 30, seed=2).samples == sent
+    slots = 30 * env.steps_max * env.agents
+    assert sent == slots if gate == "open" else 0 < sent < slots
 
 
 def test_the_same_seed_gives_the_same_lexicon_and_another_seed_another() -> None:

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from models.envs.grid import STAY
 from models.envs.registry import make as make_env
 from models.envs.traffic_junction import with_arrival
 from models.policies import scripted
@@ -68,6 +69,55 @@ def test_a_parent_finds_the_child_as_fast_as_its_rule_allows(policy: str, steps:
     assert env.success(state).mean() == pytest.approx(found, abs=0.01)
 
 
+def _ceiling(dim: int, predators: int, steps: int, late: int = 0) -> float:
+    """Exact mean over predators of the summed reward if each walks straight from step `late` on.
+
+    With m of the C - 1 cells other than the prey's within reach, k predators are there: E k = N m / (C - 1)
+    and E k(k - 1) = N (N - 1) m (m - 1) / ((C - 1) (C - 2)); a step pays .05 (k^2 + k - N) / N each.
+    """
+    row, col = np.divmod(np.arange(dim * dim), dim)
+    distance = np.abs(row[:, None] - row) + np.abs(col[:, None] - col)  # (prey, cell)
+    within = np.array([(distance <= t - late).sum(1) - 1 for t in range(1 + late, steps + 1)])  # (T, prey)
+    others = dim * dim - 1
+    single = predators * within / others
+    pairs = predators * (predators - 1) * within * (within - 1) / (others * (others - 1))
+    return float((pairs + 2 * single - predators).mean(1).sum() - late * predators) * 0.05 / predators
+
+
+# Planning noted 2.446 / 7.944, and 2.245 / 7.65 one step late; the exact values are computed above.
+@pytest.mark.parametrize(
+    ("size", "sizes", "policy", "late", "noted"),
+    [
+        ("5x5", (5, 3, 20), "straight", 0, 2.446),
+        ("5x5", (5, 3, 20), "straight-late", 1, 2.245),
+        ("10x10", (10, 5, 40), "straight", 0, 7.944),
+        ("10x10", (10, 5, 40), "straight-late", 1, 7.65),
+    ],
+)
+def test_predators_earn_what_straight_walks_are_worth(
+    size: str, sizes: tuple[int, int, int], policy: str, late: int, noted: float
+) -> None:
+    env, rule = make_env(f"predator_prey/{size}"), scripted.make(f"scripted:{policy}")
+    state = env.init(np.arange(20_000, dtype=np.uint64))
+    earned = np.zeros(env.predators)
+    for _ in range(env.steps_max):
+        state, reward = env.step(state, rule.actions(env, state))
+        earned += reward[:, :-1].mean(0)
+
+    exact = _ceiling(*sizes, late)
+    assert exact == pytest.approx(noted, abs=0.01)
+    assert earned.mean() == pytest.approx(exact, abs=0.01)
+    assert env.success(state).all()
+
+
+def test_the_prey_of_a_straight_walk_stays_and_so_does_who_is_with_it() -> None:
+    env = make_env("predator_prey/5x5")
+    state = env.place(np.zeros(1, np.uint64), np.array([[12, 2, 10]]), np.array([12]))
+
+    assert scripted.make("scripted:straight").actions(env, state)[0].tolist() == [STAY, 2, 1, STAY]
+    assert scripted.make("scripted:straight-late").actions(env, state)[0].tolist() == [STAY] * 4
+
+
 def test_the_seekers_tour_shows_it_every_cell() -> None:
     env = make_env("parent_child")
     for corner in (0, 8, 40, 72, 80):
@@ -117,6 +167,9 @@ def test_an_unknown_name_is_answered_with_the_list_of_names() -> None:
         ("front-car-first", "parent_child"),
         ("seeker", "traffic_junction/easy"),
         ("oracle", "traffic_junction/easy"),
+        ("oracle", "predator_prey/5x5"),
+        ("straight", "parent_child"),
+        ("straight-late", "traffic_junction/easy"),
     ],
 )
 def test_a_rule_refuses_the_other_task(policy: str, task: str) -> None:

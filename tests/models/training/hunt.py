@@ -1,4 +1,4 @@
-"""A recipe for hunting that takes two updates."""
+"""A recipe for hunting that takes three updates."""
 
 RECIPE = """
 name = "predator_prey/small"
@@ -19,6 +19,16 @@ reads = "inbox"
 [check]
 every = 1
 episodes = 10
+
+[[phase]]
+name = "imitate"
+kind = "imitate"
+updates = 1
+episodes = 4
+window = 7
+rule_share = 0.5
+discrete = false
+decoder_weight = 1.0
 
 [[phase]]
 name = "listen"

@@ -69,3 +69,14 @@ def test_an_open_phase_is_judged_with_every_message_sent(env, net):
     assert checked.message_rate == 1
     assert checked.score == checked.success
     assert checked.human != checked.human  # no human trials asked for: nan
+
+
+def test_a_hunt_can_be_judged_by_what_it_earns():
+    hunt = registry.make("predator_prey/5x5")
+    net = RecurrentNet(Architecture(hunt.observation_size, hunt.actions, 12, 6, 5, "prototype", "open"))
+    plain = check(hunt, net, Phase(name="x"), SETTINGS)
+    judged = check(hunt, net, Phase(name="x"), Check(episodes=60, score="reward"))
+    played = rollout.episodes(hunt, Team(hunt, RecurrentPolicy(net)), check_seeds(60))
+    earned = played.rewards[..., :-1].sum(0).mean()
+    assert plain.score == plain.success
+    assert judged.score == judged.reward == pytest.approx(earned)

@@ -49,7 +49,8 @@ def test_a_good_recipe_is_read():
         ("model.tokens", 0, "model.tokens is for prototype and one-hot channels"),
         ("model.channel", "one-hot", "set model.message = model.tokens"),
         ("decoder.target", "location", "does not fit traffic_junction/easy"),
-        ("task", "parent_child", "parent_child has no traffic"),
+        ("task", "parent_child", "parent_child has no rule to imitate"),
+        ("check.score", "fun", "check.score: Input should be 'success' or 'reward'"),
     ],
 )
 def test_a_wrong_recipe_is_refused_in_one_line_that_names_the_field(path, value, reason):
@@ -59,6 +60,30 @@ def test_a_wrong_recipe_is_refused_in_one_line_that_names_the_field(path, value,
     assert line.startswith("my.toml: ")
     assert reason in line
     assert "\n" not in line
+
+
+HUNT = {**GOOD, "name": "predator_prey/test-1", "task": "predator_prey/5x5"}
+
+
+def test_a_hunt_can_be_imitated_and_read_for_the_place_of_the_prey():
+    for target in ("location", "coordinates"):
+        recipe = parse({**HUNT, "decoder": {"target": target}})
+        assert (recipe.phase[0].kind, recipe.decoder.target) == ("imitate", target)
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        {"start": {"human": 0.5}},
+        {"check": {"human": 10}},
+        {"phase": [{"name": "one", "kind": "imitate", "brake_weight": 2.0}]},
+        {"phase": [{"name": "one", "first_collision_only": True}]},
+        {"decoder": {"target": "occupancy"}},
+    ],
+)
+def test_a_hunt_has_no_traffic(extra):
+    with pytest.raises(RecipeError, match=r"predator_prey/5x5 has no traffic|does not fit predator_prey/5x5"):
+        parse({**HUNT, **extra})
 
 
 def test_a_gate_cannot_be_taught_to_a_policy_without_one():

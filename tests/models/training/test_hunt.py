@@ -14,7 +14,7 @@ from tests.models.training.hunt import RECIPE
 
 
 @pytest.mark.parametrize("task", ["predator_prey/5x5", "predator_prey/10x10"])
-def test_two_updates_of_a_recipe_leave_a_policy_that_hunts(task: str, tmp_path: Path) -> None:
+def test_three_updates_of_a_recipe_leave_a_policy_that_hunts(task: str, tmp_path: Path) -> None:
     recipe = tmp_path / "hunt.toml"
     recipe.write_text(RECIPE.replace("predator_prey/5x5", task))
 
@@ -23,7 +23,8 @@ def test_two_updates_of_a_recipe_leave_a_policy_that_hunts(task: str, tmp_path: 
     with (tmp_path / "run" / "log.csv").open() as file:
         logged = list(csv.DictReader(file))
     env = registry.make(task)
-    assert result.steps == 2 * 4 * env.steps_max
+    assert result.steps == 3 * 4 * env.steps_max
+    assert "imitation=" in logged[0]["parts"]
     assert all("decoder=" in row["parts"] for row in logged)
     assert float(logged[0]["message_rate"]) == 1.0  # the gate is open
     played = episodes(env, Team(env, result.policy), np.arange(3, dtype=np.uint64))

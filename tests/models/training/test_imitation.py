@@ -1,4 +1,4 @@
-"""The rule that the warm start imitates: it drives well, and careful where it says so."""
+"""The rules that warm starts imitate: one drives well, and careful where it says so; one walks straight."""
 
 from dataclasses import replace
 
@@ -7,9 +7,10 @@ import pytest
 
 from models import rollout
 from models.envs import registry
+from models.envs.grid import DOWN, LEFT, RIGHT, STAY, UP
 from models.envs.starts import human_start
 from models.envs.traffic_junction import BRAKE, GAS
-from models.training.imitation import intent, labels
+from models.training.imitation import has_rule, intent, labels
 
 
 class Rule:
@@ -83,3 +84,15 @@ def test_whoever_is_inside_the_junction_goes_first(env):
 def test_a_car_about_to_leave_intends_no_cell(env):
     state = placed(env, (0, 13), (1, 12), (1, 11))
     assert intent(env, state)[0, :3].tolist() == [-1, -1, env.routes[1][12]]
+
+
+def test_predators_are_told_to_go_straight_rows_first_and_the_prey_to_stay():
+    hunt = registry.make("predator_prey/5x5")
+    state = hunt.place(np.zeros(2, np.uint64), np.array([[0, 14, 12], [22, 11, 4]]), np.array([12, 12]))
+    assert labels(hunt, state).tolist() == [[DOWN, LEFT, STAY, STAY], [UP, RIGHT, DOWN, STAY]]
+
+
+def test_a_search_has_no_rule_to_imitate():
+    assert not has_rule("parent_child")
+    with pytest.raises(KeyError):
+        labels(registry.make("parent_child"), None)
