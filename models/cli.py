@@ -1,4 +1,4 @@
-"""`hatlab train | pack | evaluate | interpret | release | bundles`: the commands of the science.
+"""`hatlab train | pack | evaluate | interpret | release | reproduce | bundles`: the commands of the science.
 
 Exit code 0: done; 1: something failed on the way (a broken bundle, a loss that is not a number, a full disk);
 2: bad input. Either way one line on standard error. Mounted by
@@ -23,8 +23,9 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from models.envs.api import Environment
-    from models.evaluate import Measure
+    from models.evaluate import Survey
     from models.interpret.summary import Meaning
+    from models.policies.api import Policy
     from models.policies.bundle import PolicyBundle
 
 PACKAGE = Path(__file__).parent
@@ -128,7 +129,8 @@ def evaluate(
     policy: Annotated[
         str,
         typer.Argument(
-            metavar="BUNDLE", help=f"Bundle (name or folder), or a rule: {', '.join(scripted.NAMES)}."
+            metavar="BUNDLE",
+            help=f"Bundle (name or folder), folder of a run, or a rule: {', '.join(scripted.NAMES)}.",
         ),
     ],
     task: Annotated[
@@ -149,13 +151,13 @@ def evaluate(
     ] = Start.INIT,
     bundles: BundlesOption = BUNDLES,
 ) -> None:
-    """Measure a bundle or a rule-based policy; every number with its 95 % interval."""
+    """Measure a bundle, a run or a rule-based policy; every number with its 95 % interval."""
     from models import evaluate as measuring
 
     env, players = _players(policy, task, bundles, seed if sampled else None)
     question = measuring.Question(episodes, seed, start.value, arrival, masked)
     try:
-        measures = measuring.evaluate(env, players, question)
+        found = measuring.survey(env, players, question)
     except (ValueError, scripted.WrongTaskError) as error:
         _refuse(error)
     asked = {
@@ -169,10 +171,9 @@ def evaluate(
         "masked": masked,
     }
     if as_json:
-        numbers = {name: measure.to_json() for name, measure in measures.items()}
-        typer.echo(json.dumps(asked | numbers))
+        typer.echo(json.dumps(asked | found.to_json()))
     else:
-        _print_measures(asked, measures)
+        _print_survey(asked, found)
 
 
 @app.command()
@@ -360,27 +361,50 @@ def _players(policy: str, task: str | None, root: Path, draws: int | None) -> tu
             return registry.make(task), scripted.make(policy)
         except (registry.UnknownTaskError, scripted.UnknownScriptedError) as error:
             _refuse(error)
-    held = _bundle(policy, root)
-    if task is not None and task != held.manifest.task:
-        _refuse(f"{held.name} was trained for {held.manifest.task}, not {task}; leave out --task")
-    env = registry.make(held.manifest.task)
-    return env, Team(env, held.policy, None if draws is None else GeneratorDraws(draws))
+    name, own, mind = _mind(policy, root)
+    if task is not None and task != own:
+        _refuse(f"{name} was trained for {own}, not {task}; leave out --task")
+    env = registry.make(own)
+    return env, Team(env, mind, None if draws is None else GeneratorDraws(draws))
+
+
+def _mind(policy: str, root: Path) -> tuple[str, str, Policy]:
+    """Name, task and policy of a bundle or of the folder of a run."""
+    from models.training import RecipeError, held
+    from models.training.checkpoint import CheckpointError
+
+    if not (Path(policy) / held.RECIPE).is_file():
+        released = _bundle(policy, root)
+        return released.name, released.manifest.task, released.policy
+    try:
+        run = held.read(Path(policy))
+    except (held.RunError, RecipeError, CheckpointError) as error:
+        _refuse(error)
+    return policy, run.recipe.task, run.policy
 
 
 def _write_json(path: Path, data: dict[str, Any]) -> None:
     path.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
 
 
-def _print_measures(asked: dict[str, Any], measures: dict[str, Measure]) -> None:
+def _print_survey(asked: dict[str, Any], found: Survey) -> None:
     from rich.table import Table
 
     said = [f"{key} {value}" for key, value in asked.items() if value is not None and value is not False]
     typer.echo(", ".join(said))
     table = Table("measure", "mean", "95 % from", "to", box=None, pad_edge=False)
-    for name, measure in measures.items():
+    rows = found.measures | {
+        f"seat {one.seat} collided{' (participant)' if one.participant else ''}": one.collided
+        for one in found.seats
+    }
+    for name, measure in rows.items():
         low, high = measure.ci95
         table.add_row(name, f"{measure.mean:.4f}", f"{low:.4f}", f"{high:.4f}")
     _print_table(table)
+    if found.bursts is not None:
+        single = ", ".join(f"{name} {value:.3f}" for name, value in found.bursts.single_quantiles.items())
+        typer.echo(f"message rate in 5 steps: {found.bursts.least:.3f} to {found.bursts.most:.3f}")
+        typer.echo(f"... in 5 steps of one episode: {single}")
 
 
 def _print_table(table: Table) -> None:

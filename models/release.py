@@ -9,8 +9,10 @@ from __future__ import annotations
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
-from models import card
+from models import card, demands
 from models.envs import registry
+from models.envs.starts import has_room
+from models.envs.traffic_junction import TrafficJunction
 from models.evaluate import Question, evaluate
 from models.interpret.summary import interpret, summary
 from models.policies import bundle, scripted
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
     from models.envs.api import Environment
     from models.policies.api import Policy
 
+RESUME = "resume.safetensors"
+"""From which an unfinished run goes on elsewhere; a released one needs it no longer."""
 SEED = 7
 EPISODES = 5_000
 TOKENS_MAX = {"parent_child": 9}
@@ -53,16 +57,20 @@ def release(
         lexicon_episodes: of the lexicon; the task's own number if None.
 
     Raises:
-        ReleaseError: the run is missing, unfinished, or not fit for people.
+        ReleaseError: the run is missing, unfinished, or not fit for people; nothing is written then.
     """
     run = _finished(run_dir)
     env, policy = registry.make(run.recipe.task), run.policy
     manifest = _manifest(run, name or run.recipe.name, Provenance.read(run_dir))
     _check_fit(env, policy)
+    measured = evaluations(env, policy, episodes)
+    _check_evaluation(run_dir, manifest, measured["rows"])
     meaning = interpret(env, policy, SEED, lexicon_episodes)
-    evaluation = {**evaluations(env, policy, episodes), "meaning": summary(meaning)}
+    evaluation = {**measured, "meaning": summary(meaning)}
     text = card.text(manifest, evaluation)
-    return bundle.save(root, manifest, policy.weights(), meaning.lexicon, evaluation, text)
+    made = bundle.save(root, manifest, policy.weights(), meaning.lexicon, evaluation, text)
+    (run_dir / RESUME).unlink(missing_ok=True)
+    return made
 
 
 def evaluations(env: Environment[Any], policy: Policy, episodes: int) -> dict[str, Any]:
@@ -70,14 +78,15 @@ def evaluations(env: Environment[Any], policy: Policy, episodes: int) -> dict[st
     family = env.name.split("/")[0]
     team = Team(env, policy)
     questions = {"as_trained": Question(episodes, SEED), "masked": Question(episodes, SEED, masked=True)}
-    if family == "traffic_junction":
+    peopled = isinstance(env, TrafficJunction) and has_room(env)
+    if peopled:
         questions["human"] = Question(episodes, SEED, "human")
         questions["human_masked"] = Question(episodes, SEED, "human", masked=True)
     rows = {row: _plain(evaluate(env, team, question)) for row, question in questions.items()}
     for baseline in BASELINES[family]:
         rule = scripted.make(baseline)
         rows[baseline] = _plain(evaluate(env, rule, Question(episodes, SEED)))
-        if family == "traffic_junction":
+        if peopled:
             rows[f"{baseline} human"] = _plain(evaluate(env, rule, Question(episodes, SEED, "human")))
     return {"episodes": episodes, "seed": SEED, "rows": rows}
 
@@ -117,6 +126,12 @@ def _manifest(run: Run, name: str, provenance: Provenance) -> Manifest:
         created=datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z"),
         files={},
     )
+
+
+def _check_evaluation(run_dir: Path, manifest: Manifest, rows: dict[str, Any]) -> None:
+    facts = {"budget": manifest.budget, "tokens": manifest.sizes["tokens"]}
+    if wrong := demands.complaints(manifest.task, rows, facts):
+        raise ReleaseError(f"{run_dir}: fails its own evaluation: {'; '.join(wrong)}")
 
 
 def _check_fit(env: Environment[Any], policy: Policy) -> None:

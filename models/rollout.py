@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from models.envs.api import Environment
+from models.envs.api import Environment, take
 from models.envs.starts import ARRIVAL, HumanStart, human_start
 from models.envs.traffic_junction import TrafficJunction, with_arrival
 from models.policies.team import Memory, Talk, Team
@@ -144,13 +144,13 @@ def begin(
 
 def warmed_up(team: Team, begun: HumanStart) -> Memory:
     """What a team remembers after a warm-up in which it spoke and heard, but other hands drove."""
-    memory = team.start(len(begun.length))
+    hidden = team.start(len(begun.length)).hidden
     for step, (state, _) in enumerate(begun.warmup):
-        talk, spoken = team.speak(state, memory)
-        _, heard = team.act(state, spoken, talk)
-        keep = begun.active(step)[:, None, None]
-        memory = Memory(np.where(keep, heard.hidden, memory.hidden), heard.held)
-    return memory
+        waiting = np.flatnonzero(begun.active(step))  # the others have begun already
+        part = take(state, waiting)
+        talk, spoken = team.speak(part, Memory(hidden[waiting], None))
+        hidden[waiting] = team.act(part, spoken, talk)[1].hidden
+    return Memory(hidden, None)
 
 
 def _traffic(env: Environment[Any]) -> TrafficJunction:

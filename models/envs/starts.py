@@ -58,6 +58,11 @@ class _Draw:
     route: Ints
 
 
+def has_room(env: TrafficJunction) -> bool:
+    """Return whether there are slots for the most cars and a participant."""
+    return env.agents > CARS[1]
+
+
 def human_start(env: TrafficJunction, seeds: Seeds, arrival: float = ARRIVAL) -> HumanStart:
     """Return the starts of human trials for these situation seeds (B,).
 
@@ -66,7 +71,7 @@ def human_start(env: TrafficJunction, seeds: Seeds, arrival: float = ARRIVAL) ->
     Raises:
         ValueError: the environment has too few slots for so many cars and a participant.
     """
-    if env.agents <= CARS[1]:
+    if not has_room(env):
         raise ValueError(f"a human trial needs {CARS[1] + 1} slots, {env.name} has {env.agents}")
     seeds = np.asarray(seeds, np.uint64)
     attempt = np.zeros(len(seeds), np.int32)

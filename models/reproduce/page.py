@@ -10,7 +10,7 @@ from models.training.convergence import IN_A_ROW
 NOTHING = "–"
 MILLION = 1e6
 HEAD = """\
-This page is printed by `hatlab reproduce {name}` from the files in `docs/tables/cells`, where every number
+This page is printed by `hatlab reproduce {name}` from the JSON files in `cells`, where every number
 was measured on {episodes:,} greedy episodes (argmax) that training never saw. *n* is the number of seeds.
 Ours is the mean over seeds, in round brackets the range; with one seed, in square brackets the 95 % interval
 over episodes (Wilson for shares of episodes, else bootstrap). *Converged*: environment steps until

@@ -6,6 +6,7 @@ import numpy as np
 
 from models.envs import registry
 from models.envs.api import Environment
+from models.envs.starts import has_room
 from models.envs.traffic_junction import TrafficJunction
 from models.evaluate import Question, survey
 from models.interpret.summary import interpret, summary
@@ -34,7 +35,7 @@ def questions(recipe: Recipe, env: Environment[Any], episodes: int) -> dict[str,
     asked = {"greedy": Question(episodes, seed), "masked": Question(episodes, seed, masked=True)}
     if isinstance(env, TrafficJunction) and env.arrival != SPARSE:
         asked["sparse"] = Question(episodes, seed, arrival=SPARSE)
-    if recipe.start.human or recipe.check.human:
+    if (recipe.start.human or recipe.check.human) and isinstance(env, TrafficJunction) and has_room(env):
         asked["human"] = Question(episodes, seed, "human")
         asked["human_masked"] = Question(episodes, seed, "human", masked=True)
     return asked

@@ -383,4 +383,5 @@ def _uttered(seen: Unrolled) -> Tensor:
 
 def fingerprint(recipe: Recipe) -> str:
     """sha256 of a recipe's content."""
-    return hashlib.sha256(json.dumps(recipe.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()
+    said = recipe.model_dump(mode="json", exclude_defaults=True)  # new fields change no old recipe
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()

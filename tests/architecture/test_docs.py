@@ -10,6 +10,9 @@ import typer
 from typer.core import TyperGroup
 
 from models import roster
+from models.cli import BUNDLES, RECIPES
+from models.reproduce import tables, write
+from models.reproduce.cells import Shelf
 from server.cli import app
 from server.settings import PACKAGED_BUNDLES, Settings
 
@@ -22,7 +25,7 @@ NUMBER = re.compile(
     r"( ?(%|ms|s|min|h|kB|MB|GB|Hz|px|cells|/s|rows/s|actions/s|steps/s))?"
 )
 COMMAND = re.compile(r"(hatlab|make|python -m|node) \S+")
-PRINTED = re.compile(r"^This page is printed by `python -m \S+`", re.MULTILINE)
+PRINTED = re.compile(r"^This page is printed by `(python -m|hatlab) \S+.*?`", re.MULTILINE)
 
 
 def name(path: Path) -> str:
@@ -156,6 +159,14 @@ def test_every_table_of_measured_numbers_says_which_command_printed_it(page: Pat
 
 def test_the_page_of_agents_is_what_their_evaluations_say() -> None:
     assert text(ROOT / "docs/agents.md") == roster.page(), "run `make docs`"
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in tables.PACKAGED.glob("*.toml")))
+def test_every_table_of_the_paper_is_what_the_stored_cells_say(name: str, tmp_path: Path) -> None:
+    table = tables.load(name)
+    shelf = Shelf(RECIPES, tmp_path, ROOT / "docs/tables/cells", BUNDLES, table.episodes)
+    for path in write(table, shelf, tmp_path):
+        assert text(ROOT / "docs/tables" / path.name) == text(path), "run `make tables`"
 
 
 def test_every_decision_is_listed() -> None:

@@ -28,7 +28,7 @@ def root(tmp_path: Path) -> Path:
     return tmp_path / "bundles"
 
 
-@pytest.mark.parametrize("command", ["train", "evaluate", "interpret", "release", "bundles"])
+@pytest.mark.parametrize("command", ["train", "evaluate", "interpret", "release", "reproduce", "bundles"])
 def test_every_command_explains_itself(command: str) -> None:
     done = run(command, "--help")
     assert done.exit_code == 0
@@ -82,6 +82,28 @@ def test_evaluate_refuses_in_one_line(root: Path, words: list[str], reason: str)
     assert reason in refused("evaluate", *words, "--bundles", root, "--episodes", 5)
 
 
+def test_evaluate_names_the_participants_seat_among_all(root: Path) -> None:
+    words = ("evaluate", "scripted:random", "--task", "traffic_junction/medium", "--episodes", 20)
+    seats = json.loads(run(*words, "--start", "human", "--json").stdout)["seats"]
+    assert [seat["seat"] for seat in seats] == list(range(10))
+    assert [seat["participant"] for seat in seats] == [False] * 9 + [True]
+    assert seats[-1]["cars"] == 20
+    assert 0 < seats[0]["collided"]["ci95"][0] <= seats[0]["collided"]["mean"] <= 1
+    assert "seat 9 collided (participant)" in run(*words, "--start", "human").stdout
+    assert "seats" not in json.loads(run(*words, "--json").stdout)
+
+
+def test_evaluate_measures_a_run_that_was_never_released(tmp_path: Path) -> None:
+    recipe, folder = tmp_path / "short.toml", tmp_path / "run"
+    recipe.write_text(RECIPE.format(channel="continuous", tokens=0, updates=1))
+    assert "not the folder of a run" not in str(run("train", recipe, "--out", folder).stderr)
+    numbers = json.loads(run("evaluate", folder, "--episodes", 20, "--json").stdout)
+    assert numbers["task"] == "parent_child"
+    assert (numbers["message_rate"]["mean"], numbers["tokens_used"]["mean"]) == (1.0, 0.0)
+    (folder / "checkpoint.safetensors").unlink()
+    assert "nothing was trained yet" in refused("evaluate", folder)
+
+
 def test_a_broken_bundle_is_named_with_file_and_reason(root: Path) -> None:
     (root / NAME / "lexicon.json").write_text("{}")
     line = refused("evaluate", NAME, "--bundles", root)
@@ -120,7 +142,10 @@ def test_bundles_of_a_folder_that_does_not_exist_are_bad_input(tmp_path: Path) -
     assert "no such folder" in refused("bundles", "--bundles", tmp_path / "nowhere")
 
 
-def test_train_and_release_make_a_bundle_that_evaluates(tmp_path: Path) -> None:
+def test_train_and_release_make_a_bundle_that_evaluates(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("models.demands.DEMANDS", {})
     recipe = tmp_path / "short.toml"
     recipe.write_text(RECIPE.format(channel="prototype", tokens=9, updates=1))
     folder, root = tmp_path / "run", tmp_path / "bundles"

@@ -37,6 +37,12 @@ def trained(
     return folder
 
 
+@pytest.fixture
+def undemanding(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Agents of two updates are good enough."""
+    monkeypatch.setattr("models.demands.DEMANDS", {})
+
+
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = trained(tmp_path_factory.mktemp("runs") / "short")
@@ -44,6 +50,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.usefixtures("undemanding")
 def test_a_run_becomes_a_bundle_that_loads_and_says_where_it_comes_from(
     finished: Path, tmp_path: Path
 ) -> None:
@@ -58,6 +65,7 @@ def test_a_run_becomes_a_bundle_that_loads_and_says_where_it_comes_from(
     assert loaded.lexicon.samples == 300
 
 
+@pytest.mark.usefixtures("undemanding")
 def test_the_evaluation_was_measured_and_the_card_repeats_it(finished: Path, tmp_path: Path) -> None:
     made = release(finished, "parent_child/other-9", tmp_path, episodes=30, lexicon_episodes=300)
     rows = made.evaluation["rows"]
@@ -69,6 +77,7 @@ def test_the_evaluation_was_measured_and_the_card_repeats_it(finished: Path, tmp
     assert made.evaluation["meaning"]["messages"] == 300
 
 
+@pytest.mark.usefixtures("undemanding")
 def test_releasing_twice_gives_the_same_files_but_for_the_date(finished: Path, tmp_path: Path) -> None:
     for place in ("one", "two"):
         release(finished, None, tmp_path / place, episodes=20, lexicon_episodes=200)
@@ -82,6 +91,7 @@ def test_releasing_twice_gives_the_same_files_but_for_the_date(finished: Path, t
     assert manifests[0] == manifests[1]
 
 
+@pytest.mark.usefixtures("undemanding")
 def test_a_run_in_another_world_becomes_a_bundle_too(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     recipe = RECIPE.replace("parent_child/short-9", "predator_prey/short-9").format(
@@ -97,6 +107,7 @@ def test_a_run_in_another_world_becomes_a_bundle_too(tmp_path: Path) -> None:
     assert f" {rows['scripted:straight']['reward']['mean']:.2f} [" in card
 
 
+@pytest.mark.usefixtures("undemanding")
 def test_a_one_hot_card_warns_that_places_mean_nothing(tmp_path: Path) -> None:
     folder = trained(tmp_path / "run", channel="one-hot", updates=1)
     made = release(folder, None, tmp_path / "bundles", episodes=10, lexicon_episodes=100)
@@ -115,6 +126,25 @@ def test_a_channel_without_tokens_is_refused(tmp_path: Path) -> None:
     folder = trained(tmp_path / "run", channel="continuous", tokens=0, updates=1)
     with pytest.raises(ReleaseError, match="continuous channel has no tokens"):
         release(folder, None, tmp_path, episodes=10)
+
+
+def test_a_run_that_fails_its_own_evaluation_is_refused_and_nothing_is_written(
+    finished: Path, tmp_path: Path
+) -> None:
+    with pytest.raises(
+        ReleaseError, match=r"fails its own evaluation: found .* at least 0.99 is needed; steps"
+    ):
+        release(finished, None, tmp_path, episodes=30)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.usefixtures("undemanding")
+def test_what_a_run_goes_on_from_is_removed_once_it_is_released(tmp_path: Path) -> None:
+    folder = trained(tmp_path / "run", updates=1)
+    packed = folder / "resume.safetensors"
+    packed.write_bytes(b"")
+    release(folder, None, tmp_path / "bundles", episodes=10, lexicon_episodes=100)
+    assert not packed.exists()
 
 
 def test_a_folder_that_is_no_run_is_refused(tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def test_what_is_stored_is_not_run_again(worked) -> None:
 
 def planned(shelf: Shelf, *cells: Cell, force: bool = False) -> list[Cell]:
     plan = crew.Plan(shelf, frozenset(cells) if force else frozenset(), crew.Report())
-    assert all([plan.add(cell) for cell in cells])
+    assert all(plan.add(cell) for cell in cells)
     return list(plan.steps)
 
 
