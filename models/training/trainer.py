@@ -131,9 +131,12 @@ class Trainer:
             raise TrainingError(f"init_from {name}: its sizes are not those of [model]")
         self.learner.net.load_state_dict(own | weights)
         self._codebook_due = "channel.codebook" in set(own) - set(weights)
-        if self.learner.net.gate is not None and not any(key.startswith("gate.") for key in weights):
-            torch.nn.init.zeros_(self.learner.net.gate[-1].weight)
-            torch.nn.init.constant_(self.learner.net.gate[-1].bias, 1.0)
+        gate = self.learner.net.gate
+        if gate is not None and not any(key.startswith("gate.") for key in weights):
+            last = gate[-1]
+            assert isinstance(last, torch.nn.Linear)
+            torch.nn.init.zeros_(last.weight)
+            torch.nn.init.constant_(last.bias, 1.0)
 
     def _ancestor(self, name: str) -> dict[str, Tensor]:
         """Weights of a bundle, or of ``run:recipe``, that recipe's run with the same seed."""
