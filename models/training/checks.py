@@ -15,7 +15,8 @@ from models.training.situations import check_seeds
 
 OFF_BUDGET = 2.0  # score lost per message rate away from the budget, beyond the tolerance
 TOLERANCE = 0.01
-HALVINGS = 7  # of the interval in which the gate's threshold is looked for: to 16 / 2**7 = .1 in the logit
+HALVINGS = 12  # of the interval in which the gate's threshold is looked for: to 16 / 2**12 = .004 in the logit
+CLOSE = 0.003  # a message rate so near below the budget is good enough
 REACH = 8.0  # largest move of the threshold, in the logit: gates drawn with .9997 can be closed too
 
 
@@ -79,7 +80,10 @@ def calibrate(env: Environment[Any], net: RecurrentNet, budget: float, settings:
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         gate.bias.copy_(before + middle)
-        low, high = (middle, high) if _rate(env, net, settings) <= budget else (low, middle)
+        rate = _rate(env, net, settings)
+        low, high = (middle, high) if rate <= budget else (low, middle)
+        if 0 <= budget - rate < CLOSE:
+            break
     gate.bias.copy_(before + low)
 
 
