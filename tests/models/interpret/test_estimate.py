@@ -57,7 +57,7 @@ def test_in_a_hunt_every_message_that_was_sent_counts(gate: str) -> None:
     policy = tiny_policy(env.name, gate=gate)
     if gate == "learned":
         with torch.no_grad():
-            policy.net.gate.bias.fill_(-0.2)  # sometimes open, sometimes closed
+            policy.net.gate[-1].bias.fill_(-0.2)  # sometimes open, sometimes closed
     rollouts = list(lives(env, policy, 30, 2, ESTIMATION))
     sent = sum(int(rollout.gates.sum()) for rollout in rollouts)
 

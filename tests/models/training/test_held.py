@@ -45,8 +45,8 @@ def test_weights_are_those_of_the_run_beside_and_the_codebook_is_made_of_its_mes
 def test_a_gate_that_the_ancestor_lacks_begins_open(runs: Path) -> None:
     trainer = begun(runs, NAMES.replace("hidden = 8", 'hidden = 8\ngate = "learned"'))
     gate = {name: value for name, value in trainer.learner.net.state_dict().items() if "gate" in name}
-    assert gate["gate.bias"].tolist() == [1.0]
-    assert not gate["gate.weight"].any()
+    assert gate["gate.2.bias"].tolist() == [1.0]
+    assert not gate["gate.2.weight"].any()
 
 
 @pytest.mark.parametrize(
