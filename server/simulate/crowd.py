@@ -97,7 +97,7 @@ async def _reach(crowd: Crowd) -> None:
         async with httpx.AsyncClient(base_url=url, timeout=REACH_S) as client:
             health = await client.get("/healthz")
             study = await client.get(f"/s/{crowd.slug}")
-    except (httpx.HTTPError, httpx.InvalidURL) as error:
+    except (httpx.HTTPError, httpx.InvalidURL, OverflowError) as error:  # the last for port 99999
         raise UnreachableError(advice) from error
     if not health.headers.get("content-type", "").startswith("application/json"):
         raise UnreachableError(advice)
