@@ -78,8 +78,9 @@ $(VENV)/bin/python:
 	@command -v $(PYTHON) >/dev/null || { echo "hatlab needs Python 3.11: install it, or name yours with make PYTHON=…" >&2; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 
+# PyTorch alone comes from its index, which holds other versions of what it needs; the rest comes from pip's default.
 $(RUNTIME): $(VENV)/bin/python pyproject.toml constraints.txt
-	$(PIP) $(if $(TORCH_INDEX),--index-url $(TORCH_INDEX)) "torch==$$(sed -n 's/^torch==//p' constraints.txt)"
+	$(PIP) --no-deps $(if $(TORCH_INDEX),--index-url $(TORCH_INDEX)) "torch==$$(sed -n 's/^torch==//p' constraints.txt)"
 	$(PIP) --editable .
 	@touch $@
 

@@ -225,3 +225,7 @@ def settings_error(error: ValidationError) -> str:
     """The first wrong setting by its variable's name; the value may be a secret and is not repeated."""
     first = error.errors()[0]
     return f"HATLAB_{'_'.join(str(part) for part in first['loc']).upper()}: {first['msg']}"
+
+
+if __name__ == "__main__":
+    main()

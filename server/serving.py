@@ -58,7 +58,9 @@ def listen(host: str, port: int) -> Place:
         return Place(socket.create_server((host, port), family=family, backlog=BACKLOG), host)
     except OSError as error:
         reason = error.strerror or str(error)
-        raise BadInputError(f"cannot listen on {host}:{port}: {reason}; choose another --port") from error
+        raise BadInputError(
+            f"cannot listen on {host}:{port}: {reason}; choose another --host or --port"
+        ) from error
 
 
 def config(settings: Settings, app: Any, workers: int = 1) -> uvicorn.Config:

@@ -3,11 +3,13 @@
 Nothing else reads the environment.
 """
 
+import re
 from pathlib import Path
 
 from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
+ADDRESS = re.compile(r"https?://[^\s/?#]+(/[^\s?#]*)?")
 PACKAGED_BUNDLES = Path(__file__).parents[1] / "models" / "bundles"
 
 
@@ -38,7 +40,10 @@ class Settings(BaseSettings):
 
     @field_validator("public_url")
     @classmethod
-    def without_final_slash(cls, url: str) -> str:
+    def an_address(cls, url: str) -> str:
+        """What links can begin with, without the final slash."""
+        if not ADDRESS.fullmatch(url):
+            raise ValueError("use an address like https://study.example.org")
         return url.rstrip("/")
 
     @field_validator("secret_key", "admin_password")

@@ -10,7 +10,7 @@ import io
 import json
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import version
@@ -74,9 +74,9 @@ def export(
 
     Raises:
         NotFoundError: there is no such study.
-        BadInputError: an unknown mode, or `out_dir` is not an empty folder.
+        BadInputError: an unknown mode, or `out_dir` is not an empty folder or cannot be written to.
     """
-    with lab.database.reading() as db, ExitStack() as stack:
+    with lab.database.reading() as db, _writable(out_dir), ExitStack() as stack:
         choice = choose(db, slug, modes, practice=practice)
         _prepare(out_dir)
         source = _Source(db, lab, choice)
@@ -88,8 +88,8 @@ def export(
         files[-1].writelines(sheets[-1].pieces(codebook.rows()))
         for sheet, file in zip(sheets, files, strict=True):
             file.writelines(sheet.pieces())
-    manifest = source.manifest(sheets)
-    (out_dir / MANIFEST).write_bytes(_text(manifest))
+        manifest = source.manifest(sheets)
+        (out_dir / MANIFEST).write_bytes(_text(manifest))
     return manifest
 
 
@@ -120,6 +120,15 @@ def _prepare(out_dir: Path) -> None:
     if out_dir.exists() and (not out_dir.is_dir() or any(out_dir.iterdir())):
         raise BadInputError(f"{out_dir} is not an empty folder: name another with --out")
     out_dir.mkdir(parents=True, exist_ok=True)
+
+
+@contextmanager
+def _writable(out_dir: Path) -> Iterator[None]:
+    """Say in one line why files cannot be written: no such place, no permission, no space left."""
+    try:
+        yield
+    except OSError as error:
+        raise BadInputError(f"cannot write to {out_dir}: {error.strerror}") from error
 
 
 def _zipped(lab: Lab, choice: Choice) -> Iterator[bytes]:

@@ -72,9 +72,12 @@ def verify(lab: Lab, study: str | None = None, audit: bool = False) -> Report:
 
 
 def version_differences(db: DbSession, study_id: int | None) -> Iterator[str]:
-    """A launched version is immutable: its text and its hash belong together."""
+    """A launched version is immutable: its text and its hash belong together, and versions count from 1."""
     for row in studies.every(db):
-        for version in studies.versions(db, row.id) if study_id in {None, row.id} else ():
+        versions = studies.versions(db, row.id) if study_id in {None, row.id} else []
+        for number, version in enumerate(versions, start=1):
+            if version.number != number:
+                yield f"study {row.slug} version {version.number}: is number {number} in the order of launches"
             if canonical.sha256(version.definition) != version.sha256:
                 yield f"study {row.slug} version {version.number}: definition was changed after its launch"
 

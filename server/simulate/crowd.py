@@ -12,6 +12,7 @@ import ssl
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from statistics import median
+from urllib.parse import urlsplit
 
 import httpx
 
@@ -94,10 +95,11 @@ async def _reach(crowd: Crowd) -> None:
     url = crowd.url
     advice = f"no hatlab server answers at {url}: start one with `hatlab serve`, or name another with --url"
     try:
+        urlsplit(url).port  # noqa: B018 (refuses a port that cannot be)
         async with httpx.AsyncClient(base_url=url, timeout=REACH_S) as client:
             health = await client.get("/healthz")
             study = await client.get(f"/s/{crowd.slug}")
-    except (httpx.HTTPError, httpx.InvalidURL) as error:
+    except (httpx.HTTPError, httpx.InvalidURL, ValueError) as error:
         raise UnreachableError(advice) from error
     if not health.headers.get("content-type", "").startswith("application/json"):
         raise UnreachableError(advice)

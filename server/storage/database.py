@@ -16,6 +16,7 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
+from alembic.util import CommandError
 from sqlalchemy import (
     Connection,
     CursorResult,
@@ -27,7 +28,7 @@ from sqlalchemy import (
     make_url,
 )
 from sqlalchemy.engine import URL
-from sqlalchemy.exc import ArgumentError, OperationalError
+from sqlalchemy.exc import ArgumentError, DatabaseError
 
 from server.domain.errors import NotReadyError
 from server.storage.shared_writer import SharedWriter
@@ -116,8 +117,8 @@ class Database:
         try:
             with self.engine.connect() as connection:
                 current = MigrationContext.configure(connection).get_current_heads()
-        except OperationalError as error:
-            raise NotReadyError(f"database {self.shown_url} cannot be reached: {error.orig}") from error
+        except DatabaseError as error:
+            raise self._unusable(error) from error
         return set(current) == set(ScriptDirectory.from_config(alembic_config()).get_heads())
 
     def upgrade(self) -> None:
@@ -131,8 +132,15 @@ class Database:
                     connection.exec_driver_sql("BEGIN IMMEDIATE")  # a migration happens whole or not at all
                 config.attributes["connection"] = connection
                 command.upgrade(config, "head")
-        except OperationalError as error:
-            raise NotReadyError(f"database {self.shown_url} cannot be reached: {error.orig}") from error
+        except DatabaseError as error:
+            raise self._unusable(error) from error
+        except CommandError as error:
+            raise NotReadyError(
+                f"database {self.shown_url} was migrated by another hatlab, perhaps a newer one: {error}"
+            ) from error
+
+    def _unusable(self, error: DatabaseError) -> NotReadyError:
+        return NotReadyError(f"database {self.shown_url} cannot be used: {error.orig}")
 
     @property
     def shown_url(self) -> str:
@@ -147,7 +155,7 @@ class Database:
 def parsed(url: str) -> URL:
     try:
         given = make_url(url)
-    except ArgumentError as error:
+    except (ArgumentError, ValueError) as error:  # the latter for a port that is no number
         raise NotReadyError("HATLAB_DATABASE_URL is not a database URL") from error
     if given.drivername in {"postgresql", "postgres", "postgresql+psycopg"}:
         return given.set(drivername="postgresql+psycopg")

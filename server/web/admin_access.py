@@ -110,4 +110,5 @@ def set_cookie(
 def safe_target(target: str) -> str:
     """Where to go after signing in: an admin page of this server, whatever the link said."""
     inside = target == HOME or target.startswith((f"{HOME}/", f"{HOME}?"))
-    return target if inside and "\\" not in target and target.isprintable() else HOME
+    is_plain = target.isprintable() and "\\" not in target and "/.." not in target
+    return target if inside and is_plain else HOME

@@ -19,7 +19,7 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from server.domain.errors import HatlabError, StaleError
-from server.web.pages import ErrorPage
+from server.web.pages import Action, ErrorPage
 from server.web.rendering import ROOT, html
 
 log = structlog.get_logger("hatlab.web")
@@ -41,6 +41,12 @@ ADVICE = {
     500: "What you did so far is kept. Reload this page in a moment; if this happens again, write to the "
     "study's contact and name the incident below.",
 }
+ADMIN_ADVICE = {
+    413: "Go back and send less.",
+    503: "Nothing was lost. Try again in a moment; the server's log tells more under the incident below.",
+    500: "Nothing was changed. Try again in a moment; the server's log tells more under the incident below.",
+}
+ADMIN_HOME = Action("All studies", "/admin")
 
 
 def problem(
@@ -78,9 +84,22 @@ def answer(
     """The error in the form that the asker can read."""
     if wants_json(scope):
         return problem(status, title, detail, more, headers)
-    said = tuple(text for text in (detail, ADVICE.get(status, "")) if text)
-    incident = (more or {}).get("incident")
-    return html(ErrorPage(status, title, said, incident), status, headers=headers)
+    return html(
+        page(scope["path"], status, title, detail, (more or {}).get("incident")), status, headers=headers
+    )
+
+
+def page(path: str, status: int, title: str, detail: str, incident: str | None) -> ErrorPage:
+    """The error in sentences, and what to do: participants have a link, experimenters a list of studies."""
+    is_admin = path == "/admin" or path.startswith("/admin/")
+    advice = (ADMIN_ADVICE if is_admin else ADVICE).get(status, "")
+    said = tuple(text for text in (sentence(detail), advice) if text)
+    return ErrorPage(status, title, said, incident, ADMIN_HOME if is_admin else None)
+
+
+def sentence(text: str) -> str:
+    """What the command line says after a colon, as a page says it."""
+    return text and text[0].upper() + text[1:] + ("" if text.endswith((".", "!", "?")) else ".")
 
 
 async def on_hatlab_error(request: Request, error: Exception) -> Response:

@@ -126,3 +126,4 @@ class ErrorPage:
     heading: str
     paragraphs: tuple[str, ...]
     incident: str | None = None
+    action: Action | None = None

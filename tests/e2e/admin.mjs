@@ -67,7 +67,10 @@ async function build(who, page) {
   assert.ok(await page.getByText("There are changes that are not saved.").isVisible());
   await page.keyboard.press("Enter"); // saves, and removes no arm
   const message = "Budget 0.5 does not match this agent, which was trained for 1.";
-  await page.locator("td .error", { hasText: message }).waitFor();
+  const said = page.locator("td .error", { hasText: message });
+  await said.waitFor();
+  const { height = 0 } = (await said.boundingBox()) ?? {};
+  assert.ok(height < 30, `the message stands in one line below its arm, not ${height} px high in its first column`);
   assert.equal(await budget.inputValue(), "0.5");
   assert.equal(await budget.getAttribute("aria-invalid"), "true");
   await who.look(page, "mistake");

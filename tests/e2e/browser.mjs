@@ -102,7 +102,10 @@ export class Participant {
     this.#looking = true;
     await page.screenshot({ path: join(this.artefacts, file) });
     await accessible(page, what);
-    await page.waitForTimeout(100); // console messages come on their own time
+    // Console messages come on their own time, but in order: what precedes the last word belongs to the look.
+    const last_word = page.waitForEvent("console", (message) => message.text() === "looked");
+    await page.evaluate(() => setTimeout(() => console.debug("looked")));
+    await last_word;
     this.#looking = false;
   }
 }

@@ -111,7 +111,7 @@ def test_a_port_that_is_taken_is_said_before_anything_starts(hatlab: Shell) -> N
     with socket.create_server(("127.0.0.1", 0)) as taken:
         done = hatlab("serve", "--port", str(taken.getsockname()[1]))
     assert done.returncode == 2
-    assert "choose another --port" in done.stderr
+    assert "choose another --host or --port" in done.stderr
 
 
 def test_a_server_says_where_it_is_which_agent_it_left_out_and_stops_when_told(hatlab: Shell) -> None:

@@ -71,7 +71,7 @@ function coachParent(view) {
   if (view.step === 1) return "You took one step. The ring is where you began, the line is where you walked.";
   if (view.step === 2) return "The filled sign is what the child says. In practice all signs are blank.";
   if (view.step === 3) return "You see only the squares inside the black frame. Walk on until the child shows up.";
-  return "Walk on until the child shows up inside your frame.";
+  return "Walk on until the child shows up inside your frame. A step against the border counts too.";
 }
 
 /** @param {ChildView} view */

@@ -16,7 +16,7 @@ form.addEventListener("submit", (event) => {
   const button = /** @type {HTMLButtonElement | null} */ (event.submitter);
   if (button?.value === "no" || tick.checked) return report();
   event.preventDefault();
-  why.textContent = "Please tick this box first, if you agree.";
+  why.textContent = "Please tick this box first.";
   tick.setAttribute("aria-invalid", "true");
   tick.focus();
 });

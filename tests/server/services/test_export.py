@@ -241,6 +241,12 @@ def test_a_folder_with_something_in_it_is_left_alone(lab: Lab, tmp_path: Path) -
     assert (tmp_path / "kept.txt").read_text() == "mine"
 
 
+def test_a_place_that_cannot_be_written_to_is_named(lab: Lab, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(BadInputError, match=r"cannot write to .*inside: Not a directory"):
+        export(lab, "signs", (), tmp_path / "file" / "inside")
+
+
 def test_memory_does_not_grow_with_the_number_of_people(
     sqlite_database: Database, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -48,7 +48,14 @@ def test_secrets_are_not_shown_and_empty_ones_are_none(
     read = Settings()
     assert "do not print me" not in repr(read)
     assert read.admin_password is None
+
+
+def test_links_begin_with_an_address(tmp_path: Path) -> None:
     assert settings(tmp_path, public_url="https://lab.example/").public_url == "https://lab.example"
+    assert settings(tmp_path, public_url="http://10.0.0.1:80/lab/").public_url == "http://10.0.0.1:80/lab"
+    for wrong in ("lab.example", "ftp://lab.example", "https://", "https://lab.example?a=1", ""):
+        with pytest.raises(ValueError, match="use an address like"):
+            settings(tmp_path, public_url=wrong)
 
 
 def test_settings_are_frozen(tmp_path: Path) -> None:

@@ -243,6 +243,10 @@ def test_an_arm_a_launched_text_and_a_code_are_checked_too(lab: Lab) -> None:
         db.write(update(allocation).values(probability=0.5))
     assert "allocation.probability stored 0.5" in verify(lab).text
     with lab.database.writing() as db:
+        db.write(update(study_version).values(number=2))
+    assert "version 2: is number 1 in the order of launches" in verify(lab).text
+    with lab.database.writing() as db:
+        db.write(update(study_version).values(number=1))
         old = db.read(select(study_version.c.definition)).scalar_one()
         db.write(update(study_version).values(definition=old.replace("FORGED", "").replace("60", "61")))
     assert "was changed after its launch" in verify(lab).text

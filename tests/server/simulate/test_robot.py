@@ -146,9 +146,10 @@ def test_a_server_that_never_answers_is_given_up(monkeypatch: pytest.MonkeyPatch
         asyncio.run(knock())
 
 
-def test_no_server_is_said_in_one_line_that_helps() -> None:
+@pytest.mark.parametrize("url", ["http://127.0.0.1:9", "http://127.0.0.1:99999", "ftp://here", "here"])
+def test_no_server_is_said_in_one_line_that_helps(url: str) -> None:
     with pytest.raises(UnreachableError, match="start one with `hatlab serve`"):
-        simulate(Crowd("parent-child", 1, seed=1, url="http://127.0.0.1:9"), lambda: "")
+        simulate(Crowd("parent-child", 1, seed=1, url=url), lambda: "")
 
 
 def test_figures_add_up_over_robots() -> None:

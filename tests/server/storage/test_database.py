@@ -36,7 +36,15 @@ def test_an_empty_postgres_is_not_current(database: Database) -> None:
 
 
 @pytest.mark.parametrize(
-    "url", ["mysql://host/db", "sqlite://", "sqlite:///:memory:", "not a url", "sqlite+aiosqlite:///x.db"]
+    "url",
+    [
+        "mysql://host/db",
+        "sqlite://",
+        "sqlite:///:memory:",
+        "not a url",
+        "sqlite+aiosqlite:///x.db",
+        "postgresql://h:port/d",
+    ],
 )
 def test_a_url_that_cannot_be_used_is_refused_in_one_line(url: str) -> None:
     with pytest.raises(NotReadyError) as caught:
@@ -49,8 +57,26 @@ def test_a_plain_postgres_url_gets_our_driver_and_its_password_is_not_shown() ->
     database = Database("postgresql://someone:secret@127.0.0.1:1/db")
     assert database.url.drivername == "postgresql+psycopg"
     assert "secret" not in database.shown_url
-    with pytest.raises(NotReadyError, match="cannot be reached"):
+    with pytest.raises(NotReadyError, match="cannot be used"):
         database.is_current()
+
+
+def test_a_file_that_is_no_database_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
+    file = tmp_path / "notes.txt"
+    file.write_text("a letter to somebody")
+    database = Database(f"sqlite:///{file}")
+    for ask in (database.is_current, database.upgrade):
+        with pytest.raises(NotReadyError, match="file is not a database"):
+            ask()
+    assert file.read_text() == "a letter to somebody"
+
+
+def test_a_database_of_a_newer_hatlab_is_refused_and_left_as_it_is(database: Database) -> None:
+    with database.engine.begin() as connection:
+        connection.exec_driver_sql("UPDATE alembic_version SET version_num = '9999'")
+    assert not database.is_current()
+    with pytest.raises(NotReadyError, match="newer"):
+        database.upgrade()
 
 
 def test_sqlite_survives_power_loss_by_its_settings(sqlite_database: Database) -> None:

@@ -128,6 +128,7 @@ def test_a_stranger_is_sent_back_to_the_page_after_signing_in(site: Lab) -> None
         "/administrator",
         "/admin\\@evil.example",
         "/admin/\n",
+        "/admin/../p/somebody",
     ],
 )
 def test_signing_in_never_leads_to_another_site(target: str) -> None:

@@ -46,6 +46,14 @@ def client_of_a_failing_server() -> Client:
     def stale(key: str, body: RoundBody) -> None:
         raise StaleError("this step was already taken", {"seq": 3})
 
+    @app.get("/admin/studies/{slug}")
+    def study(slug: str) -> None:
+        raise NotFoundError(f"there is no study {slug}")
+
+    @app.get("/admin/crash")
+    def admin_crash() -> None:
+        raise RuntimeError
+
     @app.get("/bug/{key}")
     def bug(key: str) -> None:
         try:
@@ -64,8 +72,16 @@ def test_people_get_a_page_that_says_what_to_do(client: Client) -> None:
     response = client.get(f"/p/{KEY}")
     assert response.status_code == 404
     assert response.headers["content-type"].startswith("text/html")
-    assert "there is no such session" in response.text
+    assert "<p>There is no such session.</p>" in response.text
     assert "open the one from your invitation" in response.text
+
+
+@pytest.mark.parametrize("path", ["/admin/studies/nothing", "/admin/nowhere", "/admin/crash"])
+def test_experimenters_are_told_of_their_studies_not_of_an_invitation(client: Client, path: str) -> None:
+    told = client.get(path).text
+    assert 'href="/admin">All studies</a>' in told
+    assert "invitation" not in told
+    assert "study&#39;s contact" not in told
 
 
 def test_scripts_get_problem_json_with_the_current_view(client: Client) -> None:
