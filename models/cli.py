@@ -247,18 +247,18 @@ def reproduce(
     bundles: BundlesOption = BUNDLES,
 ) -> None:
     """Train and measure what is missing of a table, then write it; exit 1 if anything failed."""
-    from models import reproduce as reproducing
+    from models.reproduce import cells, crew, publish, tables
 
     try:
-        asked = reproducing.tables.load(table)
+        asked = tables.load(table)
         wanted = asked.cells(only, _numbers(seeds))
-    except reproducing.tables.TableError as error:
+    except tables.TableError as error:
         _refuse(error)
     if run and not wanted:
         _refuse(f"{table}: no cell fits --only {only} --seeds {seeds or 'of the table'}")
-    shelf = reproducing.cells.Shelf(recipes, runs, out / "cells", bundles, asked.episodes)
-    report = reproducing.crew.run(shelf, jobs, wanted, force=force) if run else reproducing.crew.Report()
-    for path in reproducing.write(asked, shelf, out):
+    shelf = cells.Shelf(recipes, runs, out / "cells", bundles, asked.episodes)
+    report = crew.run(shelf, jobs, wanted, force=force) if run else crew.Report()
+    for path in publish.write(asked, shelf, out):
         typer.echo(f"written: {path}")
     if run:
         typer.echo(str(report))

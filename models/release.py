@@ -83,7 +83,7 @@ def evaluations(env: Environment[Any], policy: Policy, episodes: int) -> dict[st
         questions["human"] = Question(episodes, SEED, "human")
         questions["human_masked"] = Question(episodes, SEED, "human", masked=True)
     rows = {row: _plain(evaluate(env, team, question)) for row, question in questions.items()}
-    for baseline in BASELINES[family]:
+    for baseline in BASELINES.get(family, ()):
         rule = scripted.make(baseline)
         rows[baseline] = _plain(evaluate(env, rule, Question(episodes, SEED)))
         if peopled:

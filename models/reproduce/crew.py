@@ -186,9 +186,17 @@ class Crew:
         self._bar.remove_task(one.task)
         if one.process.returncode:
             self._failed(cell, one.reason())
+        elif not self._is_stored(cell):
+            self._failed(cell, "its recipe, or its ancestor's, was changed meanwhile; run it again")
         else:
             self.report.done.append(cell)
             self._tell(cell, "done")
+
+    def _is_stored(self, cell: Cell) -> bool:
+        try:
+            return self.shelf.is_fresh(cell)
+        except RecipeError:
+            return False
 
     def _failed(self, cell: Cell, reason: str) -> None:
         self.report.failed[cell] = reason

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 from models.reproduce.cells import Cell, Shelf
 from models.reproduce.tables import SLACK, Column, Entry, Row, Table
+from models.training.config import RecipeError
 from models.training.convergence import Criterion, converged
 
 NOT_RUN, NO_RECIPE = "not run", "no recipe yet"
@@ -72,7 +73,10 @@ class Stock:
 
     def known(self, cell: Cell) -> dict[str, Any] | None:
         """What is stored, if it is of the recipe as it stands."""
-        return self.shelf.record(cell) if self.shelf.is_fresh(cell) else None
+        try:
+            return self.shelf.record(cell) if self.shelf.is_fresh(cell) else None
+        except RecipeError:
+            return None
 
     def _smallest(self, column: Column, entry: Entry) -> tuple[str | None, str]:
         """The recipe with the smallest budget that is nearly as good as the row it is compared with."""

@@ -79,11 +79,13 @@ def _ours(figure: Number | None, digits: int) -> str:
 
 
 def _cost(records: Sequence[dict[str, Any]], key: str, text: Callable[[float], str]) -> str:
-    """Mean over seeds, and in brackets with those of the ancestors, "?" where a bundle does not know."""
+    """Mean over seeds, and in brackets with those of the ancestors; "?" where nobody measured it."""
     if not records:
         return NOTHING
     own = [stored["training"][key] for stored in records]
     before = [stored["training"][f"{key}_before"] for stored in records]
+    if any(value is None for value in own):
+        return "?"
     mean = sum(own) / len(own)
     if any(value is None for value in before):
         return f"{text(mean)} (?)"

@@ -31,6 +31,7 @@ BOOK = "cell.json"
 NICE = 10
 BOOK_EVERY_S = 5.0  # what a kill may lose of the count
 CURVE = ("total", "env_steps", "success", "reward", "message_rate")
+COSTS = ("env_steps", "cpu_minutes")
 REFUSED = 2
 REFUSALS = (
     RecipeError,
@@ -204,8 +205,9 @@ def cost(
     shelf: Shelf, cell: Cell, recipe: Recipe, run: held.Run, rows: list[dict[str, str]]
 ) -> dict[str, Any]:
     """Environment steps and CPU minutes: of this run, and with those of the agents that it starts from."""
-    cpu_s = float(rows[-1].get("cpu_s") or _book(shelf.run(cell)).get("cpu_s", 0.0))
-    own = {"updates": run.updates, "env_steps": run.steps, "cpu_minutes": round(cpu_s / 60, 2)}
+    cpu_s = rows[-1].get("cpu_s") or _book(shelf.run(cell)).get("cpu_s")
+    minutes = None if cpu_s is None else round(float(cpu_s) / 60, 2)  # the log of version 0.1 does not know
+    own = {"updates": run.updates, "env_steps": run.steps, "cpu_minutes": minutes}
     before: dict[str, Any] = {"env_steps_before": 0, "cpu_minutes_before": 0.0}
     ancestor = shelf.ancestor(cell)
     if ancestor is not None:
@@ -219,8 +221,13 @@ def cost(
     return own | before
 
 
+def _sum(*parts: float | None) -> float | None:
+    known = [part for part in parts if part is not None]
+    return sum(known) if len(known) == len(parts) else None
+
+
 def log_rows(folder: Path) -> list[dict[str, str]]:
-    with (folder / LOG).open(newline="", encoding="utf-8") as file:
+    with (folder / held.LOG).open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))
 
 

@@ -18,7 +18,7 @@ from models.policies.recurrent import Architecture, RecurrentPolicy
 from models.training import checkpoint, config
 from models.training.config import Recipe
 
-RECIPE, PROVENANCE = "recipe.toml", "provenance.json"
+RECIPE, PROVENANCE, LOG = "recipe.toml", "provenance.json", "log.csv"
 ANCESTOR = "run:"
 """`init_from = "run:easy-fixed-proto"` is that recipe's run of the same seed, in the folder beside."""
 

@@ -11,8 +11,9 @@ from typer.core import TyperGroup
 
 from models import roster
 from models.cli import BUNDLES, RECIPES
-from models.reproduce import tables, write
+from models.reproduce import tables
 from models.reproduce.cells import Shelf
+from models.reproduce.publish import write
 from server.cli import app
 from server.settings import PACKAGED_BUNDLES, Settings
 

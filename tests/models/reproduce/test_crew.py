@@ -126,6 +126,15 @@ def test_a_failure_is_reported_and_stops_only_what_needs_it(tmp_path: Path) -> N
     assert report.failed[Cell("orphan", 1)] == "starts from nobody-1, which cannot be had"
 
 
+def test_a_recipe_that_is_changed_while_it_is_trained_is_a_failure_and_no_endless_round(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shelf = laid_out(tmp_path)
+    words = ["-c", "import sys; open(sys.argv[1], 'a').write('lr = 1.0')", str(shelf.recipes / "plain.toml")]
+    monkeypatch.setattr(Job, "words", lambda _: words)
+    assert "was changed meanwhile" in work(shelf, ONE).failed[ONE]
+
+
 def test_a_cell_that_is_killed_goes_on_and_ends_with_the_same_numbers(worked, tmp_path: Path) -> None:
     whole, shelf = worked[0], laid_out(tmp_path)
     job = Job.of(ONE, shelf)

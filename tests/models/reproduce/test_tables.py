@@ -10,7 +10,7 @@ from typer.testing import CliRunner, Result
 from models.cli import app
 from models.reproduce import tables
 from models.reproduce.cells import Cell
-from models.reproduce.lines import number
+from models.reproduce.lines import Line, convergence, number
 from models.reproduce.work import Job, do
 from tests.models.reproduce.tiny import TABLE, laid_out
 
@@ -83,7 +83,8 @@ def test_a_failure_is_exit_code_1(tmp_path: Path) -> None:
     laid_out(tmp_path)
     (tmp_path / "recipes/plain.toml").write_text("nothing = 1\n")
     done = reproduce(tmp_path, "--only", "plain-1")
-    assert done.exit_code == 1
+    assert (done.exit_code, type(done.exception)) == (1, SystemExit)
+    assert "not run" in (tmp_path / "out/tiny.md").read_text()
     assert "plain-1: failed: plain.toml:" in done.stderr
 
 
@@ -122,6 +123,21 @@ def test_table_1_asks_for_every_method_on_four_tasks() -> None:
     methods = ["none", "fixed-cts", "fixed-proto", "gated-cts", "gated-proto", "onehot"]
     methods += [f"enforcer-{b}" for b in ("090", "070", "050", "030", "020", "010")]
     assert recipes == {f"{task}-{m}" for task in ("easy", "medium", "prey5", "prey10") for m in methods}
+
+
+def test_a_budget_counts_from_where_it_starts_and_only_if_it_is_kept() -> None:
+    column = tables.load("table2").column[0]
+    entry = tables.Entry(recipe="x", paper={"views.greedy.success": 0.98}, epochs=35, additional=True)
+    curve = [
+        "total,env_steps,success,message_rate",
+        *(f"{n},{n}000,0.97,{'.9' if n < 5 else '.31'}" for n in range(30)),
+    ]
+    stored = {"curve": curve, "content": {"budget": 0.3}, "training": {"env_steps_before": 10**6}}
+    line = Line("Enforcer-.3", column, entry, "", [1], 1, [stored])
+    assert convergence(line) == [5000]
+    assert convergence(line._replace(entry=entry.model_copy(update={"additional": False}))) == [1_005_000]
+    never = stored | {"curve": curve[:20]}
+    assert convergence(line._replace(records=[never])) == [None]
 
 
 def test_several_seeds_give_mean_and_range_and_one_its_interval() -> None:
