@@ -23,7 +23,6 @@ from models.reproduce.cells import Cell, Shelf, same_recipe
 from models.reproduce.views import meaning, views
 from models.training import checkpoint, held
 from models.training.config import Recipe, RecipeError
-from models.training.log import FILE as LOG
 from models.training.trainer import fingerprint
 
 BOOK = "cell.json"

@@ -15,7 +15,7 @@ from models.training.situations import check_seeds
 
 OFF_BUDGET = 2.0  # score lost per message rate away from the budget, beyond the tolerance
 TOLERANCE = 0.01
-HALVINGS = 12  # of the interval in which the gate's threshold is looked for: to 16 / 2**12 = .004 in the logit
+HALVINGS = 12  # of the interval in which the gate's threshold is looked for: to 16 / 2**12 = .004
 CLOSE = 0.003  # a message rate so near below the budget is good enough
 REACH = 8.0  # largest move of the threshold, in the logit: gates drawn with .9997 can be closed too
 
