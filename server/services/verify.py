@@ -77,7 +77,7 @@ def version_differences(db: DbSession, study_id: int | None) -> Iterator[str]:
         versions = studies.versions(db, row.id) if study_id in {None, row.id} else []
         for number, version in enumerate(versions, start=1):
             if version.number != number:
-                yield f"study {row.slug} version {version.number}: is number {number} in the order of launches"
+                yield f"study {row.slug} version {version.number}: is launch number {number}"
             if canonical.sha256(version.definition) != version.sha256:
                 yield f"study {row.slug} version {version.number}: definition was changed after its launch"
 

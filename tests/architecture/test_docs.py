@@ -111,6 +111,16 @@ def test_the_table_names_no_setting_that_is_gone() -> None:
     assert named == {field.upper() for field in Settings.model_fields}
 
 
+def test_every_variable_of_tests_and_builds_is_read_somewhere() -> None:
+    table = sections(ROOT / "docs/settings.md")[3]
+    named = re.findall(r"`(\w+)`", " ".join(re.findall(r"^\|([^|]+)\|", table, flags=re.MULTILINE)))
+    readers = [ROOT / path for path in ("Makefile", "Dockerfile", "compose.yaml", ".ci/need-browser")]
+    read = "\n".join(text(path) for path in readers)
+
+    assert named
+    assert [each for each in named if not re.search(rf"\b{each}\b", read)] == []
+
+
 @pytest.mark.parametrize(("command", "option"), sorted(options()))
 def test_every_command_and_option_is_documented(command: str, option: str) -> None:
     assert is_named(f"hatlab {command}")

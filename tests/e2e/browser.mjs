@@ -2,10 +2,10 @@
 // A real Chromium and what a participant does in it. Used by play.mjs; the assertions are node's own.
 
 import assert from "node:assert/strict";
-import { mkdirSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
-import { join } from "node:path";
+import { delimiter, join } from "node:path";
 import { chromium } from "playwright-core";
 
 /** @import { BrowserContext, Page } from "playwright-core" */
@@ -20,6 +20,11 @@ const FLAGS = [
   "--disable-component-update",
   "--disable-sync",
 ];
+const PLACES = (process.env.PATH ?? "").split(delimiter);
+/** The same names as in .ci/need-browser and conftest.py. */
+const CHROMIUM = ["chromium", "chromium-browser", "google-chrome"]
+  .flatMap((name) => PLACES.map((place) => join(place, name)))
+  .find((file) => existsSync(file));
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 
 export const SIZES = { large: { width: 1280, height: 720 }, small: { width: 1024, height: 640 } };
@@ -53,7 +58,7 @@ export class Participant {
     const profile = mkdtempSync(join(tmpdir(), "hatlab-profile-"));
     mkdirSync(artefacts, { recursive: true });
     const context = await chromium.launchPersistentContext(profile, {
-      executablePath: process.env.HATLAB_CHROMIUM ?? "/usr/bin/chromium",
+      executablePath: process.env.HATLAB_CHROMIUM ?? CHROMIUM ?? "chromium",
       args: FLAGS,
       viewport,
     });

@@ -14,14 +14,16 @@ import pytest
 from tests.e2e.laboratory import ROOT, Laboratory, laboratory
 
 NODE_MAJOR = 20
+CHROMIUM = ("chromium", "chromium-browser", "google-chrome")  # the same names as in browser.mjs
 
 
 def missing() -> list[str]:
     """What is not here, by the name under which to install it."""
-    chromium = os.environ.get("HATLAB_CHROMIUM") or shutil.which("chromium") or "/usr/bin/chromium"
+    named = os.environ.get("HATLAB_CHROMIUM")
+    chromium = Path(named).exists() if named else any(map(shutil.which, CHROMIUM))
     wanted = {
         f"Node {NODE_MAJOR}": node_is_new_enough(),
-        "Chromium": Path(chromium).exists(),
+        "Chromium": chromium,
         "node_modules (npm ci)": (ROOT / "node_modules" / "playwright-core").is_dir(),
     }
     return [name for name, here in wanted.items() if not here]

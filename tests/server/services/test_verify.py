@@ -244,7 +244,7 @@ def test_an_arm_a_launched_text_and_a_code_are_checked_too(lab: Lab) -> None:
     assert "allocation.probability stored 0.5" in verify(lab).text
     with lab.database.writing() as db:
         db.write(update(study_version).values(number=2))
-    assert "version 2: is number 1 in the order of launches" in verify(lab).text
+    assert "version 2: is launch number 1" in verify(lab).text
     with lab.database.writing() as db:
         db.write(update(study_version).values(number=1))
         old = db.read(select(study_version.c.definition)).scalar_one()
