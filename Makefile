@@ -63,7 +63,7 @@ screenshots: $(RUNTIME) $(NODE) ## take the pictures of README and docs again (n
 
 docs: $(DEV) ## write the generated documents again (data dictionary, released agents)
 	$(BIN)/python -m server.services.codebook > docs/data-dictionary.md
-	$(BIN)/python -m models.roster > docs/agents.md
+	$(BIN)/python -m models.roster > docs/released-agents.md
 
 tables: $(RUNTIME) ## write docs/tables again from the stored cells, without training
 	$(foreach table,table1 table2 parent-child human,$(BIN)/hatlab reproduce $(table) --no-run &&) true

@@ -67,18 +67,28 @@ def _facts(manifest: Manifest) -> str:
     facts = {
         "channel": f"{manifest.channel}, {sizes['tokens']} tokens of {sizes['message']} numbers",
         "gate": f"{manifest.gate}, budget {manifest.budget:g}",
+        "network": manifest.architecture,
         "sizes": ", ".join(f"{name} {size}" for name, size in sorted(sizes.items())),
         "trained": f"{manifest.steps_trained:,} environment steps, seed {manifest.seed}",
         "warm start": manifest.warm_start or "none",
         "supervised help": supervised_help(manifest.recipe),
-        "source": f"commit {manifest.git_commit}",
+        "source": source(manifest),
         "made": manifest.created,
     }
     return "\n".join(f"- {name}: {value}" for name, value in facts.items())
 
 
+def source(manifest: Manifest) -> str:
+    """Where the weights come from."""
+    if (imported := manifest.recipe.get("imported")) is not None:
+        return f"trained elsewhere: {imported['source']}"
+    return f"commit {manifest.git_commit}"
+
+
 def supervised_help(recipe: dict[str, Any]) -> str:
     """What training used besides the reward."""
+    if "imported" in recipe:
+        return f"{recipe['imported']['supervised_help']} (as its maker says)"
     used = []
     if recipe.get("decoder", {}).get("target", "none") != "none":
         used.append(

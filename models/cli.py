@@ -1,4 +1,4 @@
-"""`hatlab train | pack | evaluate | interpret | release | reproduce | bundles`: the commands of the science.
+"""The commands of the science: `hatlab train`, `evaluate`, `release`, `import` and others.
 
 Exit code 0: done; 1: something failed on the way (a broken bundle, a loss that is not a number, a full disk);
 2: bad input. Either way one line on standard error. Mounted by
@@ -218,11 +218,31 @@ def release(
     from models.training import RecipeError, TrainingError
     from models.training.checkpoint import CheckpointError
 
-    if name is not None and not bundle.NAME.fullmatch(name):
-        _refuse(f"name {name!r} is not of the form task_folder/name-1")
+    if name is not None:
+        _check_name(name)
     try:
         made = releasing.release(run_dir, name, bundles, episodes)
     except (releasing.ReleaseError, bundle.BundleError, RecipeError, TrainingError, CheckpointError) as error:
+        _refuse(error)
+    typer.echo(f"{bundles / made.name}: sha256 {made.sha256}")
+
+
+@app.command("import")
+def bring(
+    folder: Annotated[
+        Path, typer.Argument(metavar="FOLDER", help="policy.toml and weights.safetensors or weights.npz.")
+    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the bundle: task_folder/name-1.")],
+    episodes: Annotated[int, typer.Option(min=1, help="Episodes of each evaluation.")] = 5_000,
+    bundles: BundlesOption = BUNDLES,
+) -> None:
+    """Make a bundle of a policy that was trained elsewhere, as release does of a run."""
+    from models import imported, release
+
+    _check_name(name)
+    try:
+        made = imported.bring(folder, name, bundles, episodes)
+    except (imported.ForeignError, release.ReleaseError, bundle.BundleError) as error:
         _refuse(error)
     typer.echo(f"{bundles / made.name}: sha256 {made.sha256}")
 
@@ -290,6 +310,11 @@ def list_bundles(bundles: BundlesOption = BUNDLES) -> None:
     for line in errors:
         typer.echo(line, err=True)
     raise typer.Exit(FAILED if errors else 0)
+
+
+def _check_name(name: str) -> None:
+    if not bundle.NAME.fullmatch(name):
+        _refuse(f"name {name!r} is not of the form task_folder/name-1")
 
 
 def _refuse(reason: object) -> NoReturn:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 
     from models.envs.api import Environment
     from models.policies.api import Policy
+    from models.policies.architectures import StoredPolicy
 
 RESUME = "resume.safetensors"
 """From which an unfinished run goes on elsewhere; a released one needs it no longer."""
@@ -60,17 +61,33 @@ def release(
         ReleaseError: the run is missing, unfinished, or not fit for people; nothing is written then.
     """
     run = _finished(run_dir)
-    env, policy = registry.make(run.recipe.task), run.policy
     manifest = _manifest(run, name or run.recipe.name, Provenance.read(run_dir))
+    made = publish(run_dir, manifest, run.policy, root, episodes, lexicon_episodes)
+    (run_dir / RESUME).unlink(missing_ok=True)
+    return made
+
+
+def publish(
+    source: Path,
+    manifest: Manifest,
+    policy: StoredPolicy,
+    root: Path,
+    episodes: int = EPISODES,
+    lexicon_episodes: int | None = None,
+) -> PolicyBundle:
+    """Measure a policy, estimate what its tokens mean, and write the bundle that the manifest describes.
+
+    Raises:
+        ReleaseError: it is not fit for people; nothing is written then. The line names `source`.
+    """
+    env = registry.make(manifest.task)
     _check_fit(env, policy)
     measured = evaluations(env, policy, episodes)
-    _check_evaluation(run_dir, manifest, measured["rows"])
+    _check_evaluation(source, manifest, measured["rows"])
     meaning = interpret(env, policy, SEED, lexicon_episodes)
     evaluation = {**measured, "meaning": summary(meaning)}
     text = card.text(manifest, evaluation)
-    made = bundle.save(root, manifest, policy.weights(), meaning.lexicon, evaluation, text)
-    (run_dir / RESUME).unlink(missing_ok=True)
-    return made
+    return bundle.save(root, manifest, policy.weights(), meaning.lexicon, evaluation, text)
 
 
 def evaluations(env: Environment[Any], policy: Policy, episodes: int) -> dict[str, Any]:

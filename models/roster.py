@@ -1,4 +1,4 @@
-"""The released agents side by side: `docs/agents.md` is this module printed (`make docs`).
+"""The released agents side by side: `docs/released-agents.md` is this module printed (`make docs`).
 
 Every number is read from the `evaluation.json` of a bundle, where `hatlab release` wrote it.
 """

@@ -22,8 +22,9 @@ from safetensors.torch import load as parse_tensors
 from safetensors.torch import save as tensor_bytes
 
 from models.envs import registry
+from models.policies.architectures import ARCHITECTURES, RECURRENT
 from models.policies.lexicon import Lexicon, LexiconError
-from models.policies.recurrent import Architecture, RecurrentPolicy
+from models.policies.recurrent import Architecture
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -69,6 +70,8 @@ class Manifest:
         git_commit: source that trained it.
         created: UTC, ISO 8601.
         files: sha256 of every other file of the bundle.
+        architecture: name of the network (`models.policies.architectures`); written down only if it is not
+            `recurrent`, so that the bytes, and with them the hashes, of older bundles stay what they are.
     """
 
     format: int
@@ -86,6 +89,7 @@ class Manifest:
     git_commit: str
     created: str
     files: dict[str, str]
+    architecture: str = RECURRENT
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +176,10 @@ def save(  # one argument for each file
         CARD: card.encode(),
     }
     hashes = {name: sha256(content) for name, content in contents.items()}
-    contents[MANIFEST] = _json_bytes({**asdict(manifest), "files": hashes})
+    said = {**asdict(manifest), "files": hashes}
+    if manifest.architecture == RECURRENT:
+        del said["architecture"]
+    contents[MANIFEST] = _json_bytes(said)
     for name, content in contents.items():
         (folder / name).write_bytes(content)
     return load(folder)
@@ -217,6 +224,7 @@ def _manifest(raw: bytes) -> Manifest:
     data = _object(MANIFEST, raw)
     if data.get("format") != FORMAT:
         raise BundleError(f"{MANIFEST}: format version {data.get('format')!r}, this hatlab reads {FORMAT}")
+    data.setdefault("architecture", RECURRENT)
     names = {field.name for field in fields(Manifest)}
     if names != data.keys():
         odd = ", ".join(sorted(names ^ data.keys()))
@@ -227,7 +235,7 @@ def _manifest(raw: bytes) -> Manifest:
 
 def _check_types(data: dict[str, Any]) -> None:
     kinds: dict[type | tuple[type, ...], tuple[str, ...]] = {
-        str: ("name", "task", "channel", "gate", "git_commit", "created"),
+        str: ("name", "task", "channel", "gate", "git_commit", "created", "architecture"),
         int: ("format", "task_version", "seed", "steps_trained"),
         (int, float): ("budget",),
         dict: ("sizes", "recipe", "files"),
@@ -275,6 +283,9 @@ def _check_task(manifest: Manifest) -> None:
 
 
 def _architecture(manifest: Manifest) -> Architecture:
+    if manifest.architecture not in ARCHITECTURES:
+        known = ", ".join(ARCHITECTURES)
+        raise BundleError(f"{MANIFEST}: unknown architecture {manifest.architecture!r}; known ones: {known}")
     if manifest.channel not in ("prototype", "one-hot"):
         raise BundleError(
             f"{MANIFEST}: channel {manifest.channel!r} has no tokens; prototype or one-hot needed"
@@ -287,15 +298,20 @@ def _architecture(manifest: Manifest) -> Architecture:
         raise BundleError(f"{MANIFEST}: sizes or gate cannot be ({_line(error)})") from None
 
 
-def _policy(manifest: Manifest, raw: bytes) -> RecurrentPolicy:
+def _policy(manifest: Manifest, raw: bytes) -> Policy:
     architecture = _architecture(manifest)
     try:
-        return RecurrentPolicy.from_weights(architecture, _weights(raw))
+        return ARCHITECTURES[manifest.architecture](architecture, tensors(raw))
     except ValueError as error:
         raise BundleError(f"{WEIGHTS}: {_line(error)}") from None
 
 
-def _weights(raw: bytes) -> dict[str, torch.Tensor]:
+def tensors(raw: bytes) -> dict[str, torch.Tensor]:
+    """Return the weights of a safetensors file by name.
+
+    Raises:
+        BundleError: it is cut short, not float32 or not finite.
+    """
     try:
         weights: dict[str, torch.Tensor] = parse_tensors(raw)
     except (SafetensorError, KeyError, ValueError) as error:

@@ -21,6 +21,7 @@ from torch import Tensor, nn
 
 from models.policies.api import RandomDraws, Speech
 from models.policies.channels import OneHotChannel, PrototypeChannel, gate_of, make_channel, pick
+from models.policies.shapes import require
 
 MEMORY_PARTS = 5  # hidden 1, cell 1, hidden 2, cell 2, and the encoded observation kept between speak and act
 
@@ -222,12 +223,7 @@ class RecurrentPolicy:
             ValueError: a weight is missing, unknown or of another shape.
         """
         net = RecurrentNet(architecture)
-        expected = net.state_dict()
-        if odd := sorted(set(expected) ^ set(weights)):
-            raise ValueError(f"weights do not fit the architecture: {odd[0]} is missing or unknown")
-        for name, tensor in expected.items():
-            if tensor.shape != weights[name].shape:
-                raise ValueError(f"{name} has shape {tuple(weights[name].shape)}, not {tuple(tensor.shape)}")
+        require({name: tensor.shape for name, tensor in net.state_dict().items()}, weights)
         net.load_state_dict(dict(weights))
         return cls(net)
 

@@ -146,7 +146,8 @@ class Trainer:
             source = bundle.load(self.bundles / name).policy
         except (bundle.BundleError, RunError, checkpoint.CheckpointError) as error:
             raise TrainingError(f"init_from {name}: {error}; train that recipe first") from None
-        assert isinstance(source, RecurrentPolicy)
+        if not isinstance(source, RecurrentPolicy):
+            raise TrainingError(f"init_from {name}: another architecture than the one that is trained here")
         return source.weights()
 
     def _enter(self) -> None:

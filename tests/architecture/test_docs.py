@@ -169,7 +169,7 @@ def test_every_table_of_measured_numbers_says_which_command_printed_it(page: Pat
 
 
 def test_the_page_of_agents_is_what_their_evaluations_say() -> None:
-    assert text(ROOT / "docs/agents.md") == roster.page(), "run `make docs`"
+    assert text(ROOT / "docs/released-agents.md") == roster.page(), "run `make docs`"
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in tables.PACKAGED.glob("*.toml")))

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import httpx
 import pytest
+import typer
+from typer.core import TyperGroup
 
 from server.cli import MODELS_COMMANDS
 
@@ -130,6 +132,14 @@ def test_a_server_says_where_it_is_which_agent_it_left_out_and_stops_when_told(h
         _, errors = server.communicate(timeout=60)
     assert errors.count("\n") == 1, errors
     assert "broken/manifest.json" in errors
+
+
+def test_every_command_of_the_science_is_mounted() -> None:
+    from models.cli import app
+
+    group = typer.main.get_command(app)
+    assert isinstance(group, TyperGroup)
+    assert sorted(MODELS_COMMANDS) == sorted(group.commands)
 
 
 def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:

@@ -147,6 +147,8 @@ def test_weights_that_do_not_fit_are_refused(folder: Path, change: str, reason: 
         ("name", "../../etc", "is not of the form"),
         ("channel", "continuous", "channel 'continuous' has no tokens"),
         ("gate", "ajar", "gate is 'ajar'"),
+        ("architecture", "mlp", "unknown architecture 'mlp'; known ones: recurrent, gru"),
+        ("architecture", None, "architecture is None, which is of the wrong type"),
         ("budget", "all", "budget is 'all'"),
         ("budget", 2.0, "budget is 2.0"),
         ("seed", True, "seed is True"),
@@ -169,6 +171,13 @@ def test_a_manifest_with_a_field_too_few_or_too_many_is_refused(folder: Path) ->
     assert "missing or unknown: recipe" in refusal(folder)
     rewrite_manifest(folder, lambda data: data.update(recipe={}, mood="good"))
     assert "missing or unknown: mood" in refusal(folder)
+
+
+def test_a_manifest_that_names_no_network_means_the_recurrent_one(folder: Path) -> None:
+    assert "architecture" not in json.loads((folder / bundles.MANIFEST).read_text())
+    assert load(folder).manifest.architecture == "recurrent"
+    rewrite_manifest(folder, lambda data: data.update(architecture="gru"))
+    assert "weights do not fit the architecture" in refusal(folder)
 
 
 @pytest.mark.parametrize("content", [b"", b"{", b"[]", b"\xff\xfe"])
