@@ -1,5 +1,7 @@
 """A packed run goes on where it was, nearly as it was."""
 
+import shutil
+
 import pytest
 import torch
 from typer.testing import CliRunner
@@ -12,15 +14,22 @@ from models.training.trainer import Trainer
 from tests.models.training.small import RECIPE
 
 
-@pytest.fixture
-def left(tmp_path):
+@pytest.fixture(scope="module")
+def original(tmp_path_factory):
     """A run that was left after 12 of its 13 updates, with Adam's moments filled and a best."""
-    (tmp_path / "small.toml").write_text(RECIPE)
-    trainer = opened(tmp_path, resume=False)
+    folder = tmp_path_factory.mktemp("original")
+    (folder / "small.toml").write_text(RECIPE)
+    trainer = opened(folder, resume=False)
     for _ in range(12):
         trainer.advance()
     assert trainer.best
-    return tmp_path
+    return folder
+
+
+@pytest.fixture
+def left(original, tmp_path):
+    """A copy of it."""
+    return shutil.copytree(original, tmp_path / "copy")
 
 
 def opened(folder, *, resume=True):
