@@ -71,7 +71,9 @@ def test_the_accelerator_of_this_test_refuses_what_a_real_one_does():
 
 @pytest.mark.parametrize("name", ["nonsense", "meta"])
 def test_a_device_that_cannot_compute_is_refused_in_one_line(name):
-    with pytest.raises(DeviceError, match=rf"device '{name}' cannot be used here \(.*\); cpu always can") as caught:
+    with pytest.raises(
+        DeviceError, match=rf"device '{name}' cannot be used here \(.*\); cpu always can"
+    ) as caught:
         find(name)
     assert "\n" not in str(caught.value)
     assert find("cpu") == torch.device("cpu")
