@@ -18,6 +18,7 @@ from models.interpret.summary import interpret, summary
 from models.policies import bundle, scripted
 from models.policies.bundle import Manifest, PolicyBundle
 from models.policies.team import Team
+from models.removal import removal
 from models.training import held
 from models.training.held import Provenance, Run, RunError
 
@@ -66,7 +67,9 @@ def release(
     measured = evaluations(env, policy, episodes)
     _check_evaluation(run_dir, manifest, measured["rows"])
     meaning = interpret(env, policy, SEED, lexicon_episodes)
-    evaluation = {**measured, "meaning": summary(meaning)}
+    without = removal(env, policy, meaning.lexicon, episodes, SEED)
+    said = {**summary(meaning), "null_removed": without}
+    evaluation = {**measured, "meaning": said}
     text = card.text(manifest, evaluation)
     made = bundle.save(root, manifest, policy.weights(), meaning.lexicon, evaluation, text)
     (run_dir / RESUME).unlink(missing_ok=True)
