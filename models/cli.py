@@ -1,4 +1,4 @@
-"""`hatlab train | pack | evaluate | interpret | release | reproduce | bundles`: the commands of the science.
+"""`hatlab train | pack | evaluate | interpret | figures | release | reproduce | bundles`: the science's commands.
 
 Exit code 0: done; 1: something failed on the way (a broken bundle, a loss that is not a number, a full disk);
 2: bad input. Either way one line on standard error. Mounted by
@@ -205,6 +205,24 @@ def interpret(
     _print_meaning(held, meaning, numbers)
     names = ", ".join(path.name for path in written)
     typer.echo(f"written to {out}: lexicon.json, summary.json, tokens.csv, {names}")
+
+
+@app.command("figures")
+def paper_figures(
+    out: Annotated[Path, typer.Option(help="Folder to write to.")],
+    episodes: Annotated[
+        int | None, typer.Option(min=1, help="Episodes to count in; each task's own number if absent.")
+    ] = None,
+    seed: SeedOption = 0,
+    png: Annotated[bool, typer.Option("--png", help="Write the figures as PNG too.")] = False,
+    bundles: BundlesOption = BUNDLES,
+) -> None:
+    """Draw the paper's figures from the released agents (SVG), with a README.md of their numbers."""
+    from models import gallery
+
+    held = {name: _bundle(name, bundles) for name in gallery.AGENTS}
+    for path in gallery.draw(held, out, seed, episodes, png=png):
+        typer.echo(f"written: {path}")
 
 
 @app.command()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from server.services.lab import Lab
     from server.settings import Settings
 
-MODELS_COMMANDS = ("train", "evaluate", "interpret", "bundles", "release", "reproduce")
+MODELS_COMMANDS = ("train", "evaluate", "interpret", "figures", "bundles", "release", "reproduce")
 REFUSALS = {
     "models.envs.registry": "UnknownTaskError",
     "models.policies.bundle": "BundleError",

@@ -35,7 +35,7 @@ def rate_along_route(env: TrafficJunction, agents: dict[str, Along]) -> Chart:
     """Draw the message rate by place on the route, one line per agent, with 95 % bands."""
     names, legend = list(agents), alt.Legend(title=None, orient="top", labelFontSize=12, symbolSize=90)
 
-    def by_name(kind: Any, values: tuple[Any, ...]) -> Any:
+    def by_name(kind: Any, values: tuple[Any, ...], legend: alt.Legend | None = legend) -> Any:
         scale = alt.Scale(domain=names, range=list(values[: len(names)]))
         return kind("agent:N", scale=scale, legend=None if len(names) == 1 else legend)
 
@@ -44,7 +44,7 @@ def rate_along_route(env: TrafficJunction, agents: dict[str, Along]) -> Chart:
         y=alt.Y("rate:Q", title="messages per step of a car", **_shares()),
         color=by_name(alt.Color, SERIES),
     )
-    lines = base.mark_line(strokeWidth=2).encode(strokeDash=by_name(alt.StrokeDash, DASHES))
+    lines = base.mark_line(strokeWidth=2).encode(strokeDash=by_name(alt.StrokeDash, DASHES, None))
     points = base.mark_point(filled=True, size=45, opacity=1).encode(shape=by_name(alt.Shape, SHAPES))
     bands = alt.layer(
         *(

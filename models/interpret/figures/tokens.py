@@ -21,7 +21,7 @@ from models.interpret.figures.style import (
     percent,
     title,
 )
-from models.interpret.nulls import information, sensitivity
+from models.interpret.nulls import THRESHOLDS, information, sensitivity
 from models.interpret.nulls import kinds as kinds_of
 from models.policies.lexicon import NULL_RATIO
 
@@ -126,7 +126,11 @@ def null_threshold(lexicon: Lexicon) -> Chart:
     ]
     legend = alt.Legend(title=None, orient="top", labelFontSize=12, symbolSize=90)
     base = chart(rows).encode(
-        x=alt.X("threshold:Q", title="a token is null below this share of H(cell)"),
+        x=alt.X(
+            "threshold:Q",
+            title="a token is null below this share of H(cell)",
+            axis=alt.Axis(values=list(THRESHOLDS)),
+        ),
         y=alt.Y(
             "null:Q", title="share that is null", axis=alt.Axis(format="%"), scale=alt.Scale(domain=[0, 1])
         ),

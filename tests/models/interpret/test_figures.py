@@ -88,7 +88,7 @@ def test_png_is_written_beside_svg_on_request(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("task", "strips"), [("parent_child", 18), ("traffic_junction/easy", 2), ("traffic_junction/hard", 8)]
+    ("task", "strips"), [("parent_child", 81), ("traffic_junction/easy", 2), ("traffic_junction/hard", 8)]
 )
 def test_the_ground_is_a_grid_or_the_lanes(task: str, strips: int) -> None:
     env = registry.make(task)
