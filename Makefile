@@ -17,7 +17,7 @@ HAVE_NODE := $(shell node -e 'process.exit(Number(process.versions.node.split(".
 RECIPE ?= models/recipes/parent-prototype-9.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help serve test check format bench train learn torture screenshots docs tables clean hooks
+.PHONY: help serve test check format bench train learn torture screenshots docs figures tables clean hooks
 
 help: ## list every target
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):[^#]*## */  make \1\t/' | expand -t 18
@@ -64,6 +64,9 @@ screenshots: $(RUNTIME) $(NODE) ## take the pictures of README and docs again (n
 docs: $(DEV) ## write the generated documents again (data dictionary, released agents)
 	$(BIN)/python -m server.services.codebook > docs/data-dictionary.md
 	$(BIN)/python -m models.roster > docs/released-agents.md
+
+figures: $(RUNTIME) ## draw the paper's figures again from the released agents (a few minutes)
+	$(BIN)/hatlab figures --out docs/figures
 
 tables: $(RUNTIME) ## write docs/tables again from the stored cells, without training
 	$(foreach table,table1 table2 parent-child human,$(BIN)/hatlab reproduce $(table) --no-run &&) true

@@ -40,6 +40,8 @@ COLUMNS = {
     "message_rate": "message rate",
     "tokens_used": "tokens in use",
 }
+NAMED = 24
+"""Up to so many tokens each is listed."""
 SHARES = {"found", "arrived", "collided", "limit", "success", "message_rate"}
 
 
@@ -125,29 +127,118 @@ def _cell(name: str, measure: dict[str, Any] | None) -> str:
 
 def _meaning(meaning: dict[str, Any]) -> str:
     used, tokens = meaning["tokens_in_use"], meaning["tokens"]
-    told, all_bits = meaning["mutual_information_bits"], meaning["cell_entropy_bits"]
     lines = [
-        f"- {meaning['messages']:,} messages counted",
-        f"- {used} of {tokens} tokens in use, the least used {100 * meaning['least_share_of_use']:.1f} %",
-        f"- {meaning['null_tokens']} null tokens, {100 * meaning['null_messages']:.1f} % of the messages",
-        f"- a message tells {told:.2f} of the {all_bits:.2f} bits about the cell of its speaker",
+        f"{meaning['messages']:,} messages counted",
+        f"{used} of {tokens} tokens in use, the least used {100 * meaning['least_share_of_use']:.1f} %",
+        *meaning_lines(meaning),
     ]
-    if meaning["distance_r2"] is not None:
-        slope = meaning["distance_slope_cells_per_unit"]
+    return "\n".join(f"- {line}" for line in lines)
+
+
+def meaning_lines(meaning: dict[str, Any]) -> list[str]:
+    """Return what is known about a language (`models.interpret.summary`), a line per finding."""
+    lines = [_nulls(meaning), _place(meaning), *_entropies(meaning), *_distance(meaning)]
+    if found := meaning.get("traffic"):
+        lines += _on_the_road(found)
+    if burst := meaning.get("bursts"):
+        single = burst["single_quantiles"]
         lines.append(
-            "- distance of prototypes against distance of mean locations: "
-            f"r² {meaning['distance_r2']:.2f}, slope {slope:.2f} cells per unit, {meaning['pairs']} pairs"
+            "message rate in stretches of 5 steps, all episodes: "
+            f"{burst['least']:.2f} to {burst['most']:.2f}; of single episodes: {single['q05']:.2f} to "
+            f"{single['q95']:.2f} in 90 % of stretches"
         )
+    lines += _removed(meaning.get("null_removed"))
+    return lines + _overlay(meaning.get("calibration", {}))
+
+
+def _nulls(meaning: dict[str, Any]) -> str:
+    why = meaning["null_why"]
+    return (
+        f"{meaning['null_tokens']} null tokens, {100 * meaning['null_messages']:.1f} % of the messages "
+        f"({why['never_said']} never said, {why['rare']} too rarely, {why['vague']} vague)"
+    )
+
+
+def _place(meaning: dict[str, Any]) -> str:
+    told, all_bits = meaning["mutual_information_bits"], meaning["cell_entropy_bits"]
+    return f"a message tells {told:.2f} of the {all_bits:.2f} bits about the cell of its speaker"
+
+
+def _entropies(meaning: dict[str, Any]) -> list[str]:
+    """Entropy of the place by token, of the tokens that are not null; of many, only from least to most."""
+    each = meaning["token_entropy_bits"]
+    if not each:
+        return []
+    values = sorted(each.values())
+    line = (
+        f"bits left open about the cell: by tokens that say where {values[0]:.2f} to {values[-1]:.2f}, by a "
+        f"message on average {meaning['mean_entropy_bits']:.2f}"
+    )
+    if len(each) <= NAMED:
+        line += f" (token {', '.join(f'{token}: {bits:.2f}' for token, bits in each.items())})"
+    return [line]
+
+
+def _distance(meaning: dict[str, Any]) -> list[str]:
+    words = "distance of prototypes against distance of mean locations"
+    if meaning["distance_reason"]:
+        return [f"{words}: {meaning['distance_reason']}"]
+    r2 = f"{meaning['distance_r2']:.2f}{_range(meaning['distance_r2_ci95'])}"
+    slope = f"{meaning['distance_slope_cells_per_unit']:.2f}{_range(meaning['distance_slope_ci95'])}"
+    return [f"{words}: r² {r2}, slope {slope} cells per unit, {meaning['pairs']} pairs"]
+
+
+def _range(interval: tuple[float, float] | None) -> str:
+    return "" if interval is None else f" [{interval[0]:.2f}, {interval[1]:.2f}]"
+
+
+def _on_the_road(found: dict[str, Any]) -> list[str]:
+    bits, lanes = found["information"], found["shared_between_lanes"]
+    told = ", ".join(
+        f"{name} {bits[name]['bits']:.2f} of {bits[name]['entropy_bits']:.2f}"
+        for name in ("lane", "arrival", "route", "action")
+    )
+    entering, cell = found["rate_entering"], bits["action_from_cell"]["bits"]
+    lines = [
+        f"bits that a message tells of its speaker: {told} (the cell alone tells {cell:.2f} of the action)"
+    ]
+    lines.append(f"{lanes['tokens']} of {lanes['of']} tokens are said on more than one lane")
+    if entering is not None:
+        lines.append(
+            f"a car speaks in {100 * entering['mean']:.1f} % of the steps in which it appears, in "
+            f"{100 * found['rate']['mean']:.1f} % of all its steps"
+        )
+    return lines
+
+
+def _removed(found: dict[str, Any] | None) -> list[str]:
+    """Success and message rate with and without null messages."""
+    if found is None:
+        return []
+    lines = []
+    for start, when in found.items():
+        name = "arrived" if "arrived" in when["before"] else "success"
+        pairs = [
+            f"{said} {when['before'][key]['mean']:.3f} before, {when['after'][key]['mean']:.3f} after"
+            for said, key in ((name, name), ("message rate", "message_rate"))
+        ]
+        lines.append(f"null messages not sent ({'human trials' if start == 'human' else 'as trained'}): ")
+        lines[-1] += "; ".join(pairs)
+    return lines
+
+
+def _overlay(calibration: dict[str, Any]) -> list[str]:
+    lines = []
     for truth, words in (("spoke", "cars that just spoke"), ("all_cars", "all other cars")):
-        if judged := meaning.get("calibration", {}).get(truth):
+        if judged := calibration.get(truth):
             low, high = judged["ece_ci95"]
             lines.append(
-                f"- triangles against {words}: calibration error {judged['ece']:.3f} "
-                f"[{low:.3f}, {high:.3f}], Brier skill {judged['brier_skill']:.2f}, "
-                f"coverage {judged['coverage']:.2f} "
+                f"triangles against {words}: calibration error {judged['ece']:.3f} "
+                f"[{low:.3f}, {high:.3f}], Brier score {judged['brier']:.4f}, skill "
+                f"{judged['brier_skill']:.2f}, coverage {judged['coverage']:.2f} "
                 f"({judged['drawn']:,} cells in {judged['trials']:,} held-out trials)"
             )
-    return "\n".join(lines)
+    return lines
 
 
 def _limits(manifest: Manifest) -> str:

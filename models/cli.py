@@ -187,21 +187,42 @@ def interpret(
     png: Annotated[bool, typer.Option("--png", help="Write the figures as PNG too.")] = False,
     bundles: BundlesOption = BUNDLES,
 ) -> None:
-    """Estimate what a bundle's tokens mean: lexicon.json, summary.json and figures (SVG)."""
-    from models.interpret import figures
+    """Estimate what a bundle's tokens mean: lexicon.json, summary.json, tokens.csv and figures (SVG)."""
+    from models.interpret import figures, tokens
     from models.interpret import summary as meaning_of
+    from models.removal import EPISODES, removal
 
     held = _bundle(name, bundles)
     env = registry.make(held.manifest.task)
     meaning = meaning_of.interpret(env, held.policy, seed, episodes)
     out.mkdir(parents=True, exist_ok=True)
     numbers = meaning_of.summary(meaning)
+    numbers["null_removed"] = removal(env, held.policy, meaning.lexicon, episodes or EPISODES, seed)
     _write_json(out / "lexicon.json", meaning.lexicon.to_json())
     _write_json(out / "summary.json", numbers)
-    charts = figures.figures(meaning.lexicon, meaning.distances, env.shape, meaning.calibration)
-    written = figures.write(charts, out, png=png)
+    tokens.write(meaning, out / "tokens.csv")
+    written = figures.write(figures.figures(env, meaning), out, png=png)
     _print_meaning(held, meaning, numbers)
-    typer.echo(f"written to {out}: lexicon.json, summary.json, {', '.join(path.name for path in written)}")
+    names = ", ".join(path.name for path in written)
+    typer.echo(f"written to {out}: lexicon.json, summary.json, tokens.csv, {names}")
+
+
+@app.command("figures")
+def paper_figures(
+    out: Annotated[Path, typer.Option(help="Folder to write to.")],
+    episodes: Annotated[
+        int | None, typer.Option(min=1, help="Episodes to count in; each task's own number if absent.")
+    ] = None,
+    seed: SeedOption = 0,
+    png: Annotated[bool, typer.Option("--png", help="Write the figures as PNG too.")] = False,
+    bundles: BundlesOption = BUNDLES,
+) -> None:
+    """Draw the paper's figures from the released agents (SVG), with a README.md of their numbers."""
+    from models import gallery
+
+    held = {name: _bundle(name, bundles) for name in gallery.AGENTS}
+    for path in gallery.draw(held, out, seed, episodes, png=png):
+        typer.echo(f"written: {path}")
 
 
 @app.command()
@@ -441,16 +462,13 @@ def _print_table(table: Table) -> None:
 
 
 def _print_meaning(held: PolicyBundle, meaning: Meaning, numbers: dict[str, Any]) -> None:
+    from models.card import meaning_lines
+
     typer.echo(
         f"{held.name}: {numbers['messages']:,} messages, "
         f"{numbers['tokens_in_use']} of {numbers['tokens']} tokens in use, {numbers['null_tokens']} null"
     )
-    if numbers["distance_r2"] is not None:
-        typer.echo(
-            f"distance against distance: r2 {meaning.distances.r2:.3f}, slope {meaning.distances.slope:.2f}"
-        )
-    for truth, judged in (meaning.calibration or {}).items():
-        typer.echo(
-            f"triangles ({truth}): calibration error {judged.ece:.3f}, Brier skill {judged.brier_skill:.2f}, "
-            f"coverage {judged.coverage:.2f}"
-        )
+    for line in meaning_lines(numbers):
+        typer.echo(line)
+    if meaning.traffic is None:
+        typer.echo(f"{held.manifest.task}: {numbers['left_out']}")

@@ -18,6 +18,7 @@ from models.interpret.summary import interpret, summary
 from models.policies import bundle, scripted
 from models.policies.bundle import Manifest, PolicyBundle
 from models.policies.team import Team
+from models.removal import removal
 from models.training import held
 from models.training.held import Provenance, Run, RunError
 
@@ -85,7 +86,9 @@ def publish(
     measured = evaluations(env, policy, episodes)
     _check_evaluation(source, manifest, measured["rows"])
     meaning = interpret(env, policy, SEED, lexicon_episodes)
-    evaluation = {**measured, "meaning": summary(meaning)}
+    without = removal(env, policy, meaning.lexicon, episodes, SEED)
+    said = {**summary(meaning), "null_removed": without}
+    evaluation = {**measured, "meaning": said}
     text = card.text(manifest, evaluation)
     return bundle.save(root, manifest, policy.weights(), meaning.lexicon, evaluation, text)
 

@@ -56,6 +56,10 @@ class Rollout:
     """(B,) steps until the episode was over."""
     cars: Ints
     """(B,) seats that lived in the first state."""
+    routes: Ints
+    """(T, B, N) route of each living car; -1 elsewhere, and in worlds without routes."""
+    positions: Ints
+    """(T, B, N) how far along its route it is, 0 where it entered; -1 as above."""
 
     @property
     def message_rate(self) -> float:
@@ -182,6 +186,7 @@ class _Record:
     def __init__(self, env: Environment[Any]) -> None:
         self._env = env
         self._rows: list[tuple[NDArray[Any], ...]] = []
+        self._ways: list[tuple[Ints, Ints]] = []
         self._marks: list[tuple[Bools, Bools]] = []
         self._steps: Ints | None = None
 
@@ -200,7 +205,14 @@ class _Record:
         self._steps = self._steps + ~env.done(state)
         cells = np.where(alive, env.cell_of(state), np.int32(-1))
         self._rows.append((cells, alive, tokens, gates, actions.astype(np.int32), reward))
+        self._ways.append(self._way(state, alive))
         self._marks.append(self._mark(after))
+
+    def _way(self, state: Any, alive: Bools) -> tuple[Ints, Ints]:
+        nowhere = np.full(alive.shape, -1, np.int32)
+        if not isinstance(self._env, TrafficJunction):
+            return nowhere, nowhere
+        return np.where(alive, state.route, nowhere), np.where(alive, state.position, nowhere)
 
     def _mark(self, state: Any) -> tuple[Bools, Bools]:
         if isinstance(self._env, TrafficJunction):
@@ -214,9 +226,11 @@ class _Record:
             np.stack(column) for column in zip(*self._rows, strict=True)
         )
         collided, completed = (np.stack(column) for column in zip(*self._marks, strict=True))
+        routes, positions = (np.stack(column) for column in zip(*self._ways, strict=True))
         return Rollout(
             cells, alive, tokens, gates, actions, rewards, collided, completed,
             self._env.success(state), self._steps.astype(np.int32), alive[0].sum(1).astype(np.int32),
+            routes, positions,
         )  # fmt: skip
 
 

@@ -21,7 +21,17 @@ if TYPE_CHECKING:
     from server.services.lab import Lab
     from server.settings import Settings
 
-MODELS_COMMANDS = ("train", "pack", "evaluate", "interpret", "bundles", "release", "import", "reproduce")
+MODELS_COMMANDS = (
+    "train",
+    "pack",
+    "evaluate",
+    "interpret",
+    "figures",
+    "bundles",
+    "release",
+    "import",
+    "reproduce",
+)
 REFUSALS = {
     "models.envs.registry": "UnknownTaskError",
     "models.policies.bundle": "BundleError",

@@ -49,7 +49,9 @@ class Calibration:
         bins: ten equal-count bins of the drawn cells.
         ece: expected calibration error, the mean gap |said - seen| over bins weighted by cells.
         ece_ci95: bootstrap interval over trials.
-        brier_skill: 1 - Brier / Brier of a forecaster who knows each cell's base rate; over all road cells.
+        brier: mean squared difference of likelihood and truth (0 or 1) over road cells, the own one left out.
+        brier_base: the same of a forecaster who knows each cell's base rate.
+        brier_skill: 1 - Brier / Brier of a forecaster who knows each cell's base rate.
         brier_skill_ci95: bootstrap interval over trials.
         coverage: share of cars (others, or others that just spoke) on a cell with a triangle.
         coverage_ci95: bootstrap interval over trials.
@@ -60,6 +62,8 @@ class Calibration:
     bins: tuple[Bin, ...]
     ece: float
     ece_ci95: tuple[float, float]
+    brier: float
+    brier_base: float
     brier_skill: float
     brier_skill_ci95: tuple[float, float]
     coverage: float
@@ -151,6 +155,8 @@ def judge(overlay: Overlay, cars: NDArray[np.int64], count: int, seed: int) -> C
         bins=bins,
         ece=float(_ece(table.sum(axis=0))),
         ece_ci95=_interval(_ece(np.tensordot(draws, table, axes=1))),
+        brier=float(skill[:, 0].sum() / max(skill[:, 2].sum(), 1)),
+        brier_base=float(skill[:, 1].sum() / max(skill[:, 2].sum(), 1)),
         brier_skill=float(_ratio_skill(skill.sum(axis=0))),
         brier_skill_ci95=_interval(_ratio_skill(draws @ skill)),
         coverage=float(_share(cover.sum(axis=0))),
@@ -183,12 +189,12 @@ def _ece(table: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _skill(overlay: Overlay, truth: NDArray[np.bool_], count: int) -> NDArray[np.float64]:
-    """Squared errors per trial, (trials, 2: overlay, base rate), the own cell left out."""
+    """Squared errors per trial, (trials, 3: overlay, base rate, cells asked), the own cell left out."""
     asked = ~overlay.own
     rate = (truth & asked).sum(axis=0) / np.maximum(asked.sum(axis=0), 1)  # (R,)
     mine = (overlay.likelihood - truth) ** 2 * asked
     base = (rate - truth) ** 2 * asked
-    return np.stack([_per_trial(overlay, mine, count), _per_trial(overlay, base, count)], axis=1)
+    return np.stack([_per_trial(overlay, values, count) for values in (mine, base, asked)], axis=1)
 
 
 def _per_trial(overlay: Overlay, values: NDArray[Any], count: int) -> NDArray[np.float64]:

@@ -9,16 +9,18 @@ Shapes: T steps, B episodes, N seats, K tokens, C cells.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 
 from models import rng
+from models.bursts import Windows, windows
 from models.envs.traffic_junction import TrafficJunction
 from models.interpret.plane import drawn, principal
+from models.interpret.turns import Turns, chances, turns
 from models.policies.lexicon import Lexicon
 from models.policies.team import Team
-from models.rollout import Rollout, episodes, trials
+from models.rollout import Rollout, episodes
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -42,12 +44,40 @@ def estimate(env: Environment[Any], policy: Policy, count: int, seed: int) -> Le
     Raises:
         ValueError: the policy has no tokens.
     """
+    return lexicon(env, policy, listen(env, policy, count, seed).turns, seed)
+
+
+class Heard(NamedTuple):
+    """What was noted while a policy lived."""
+
+    turns: Turns
+    """Of the seats and steps that a person notices."""
+    windows: Windows
+    """Of all seats, over whole episodes."""
+
+
+def listen(env: Environment[Any], policy: Policy, count: int, seed: int) -> Heard:
+    """Let a policy live in the episodes that lexicons are estimated from.
+
+    Raises:
+        ValueError: the policy has no tokens.
+    """
     if policy.tokens == 0:
         raise ValueError(f"a {policy.channel} channel has no tokens to interpret")
-    counts = np.zeros((policy.tokens, env.cells), np.int64)
+    parts, counted, first = [], [], 0
     for rollout in lives(env, policy, count, seed, ESTIMATION):
-        heard = hearable(env, rollout)
-        np.add.at(counts, (rollout.tokens[heard], rollout.cells[heard]), 1)
+        parts.append(turns(env, rollout, first))
+        counted.append(windows(rollout, env.speaks))
+        first += rollout.cells.shape[1]
+    sent, living = (np.concatenate(column) for column in zip(*counted, strict=True))
+    return Heard(Turns.join(parts), Windows(sent, living))
+
+
+def lexicon(env: Environment[Any], policy: Policy, taken: Turns, seed: int) -> Lexicon:
+    """Make the table of what was said where."""
+    said = taken.take(taken.sent)
+    counts = np.zeros((policy.tokens, env.cells), np.int64)
+    np.add.at(counts, (said.token, said.cell), 1)
     components = principal(vectors(policy), counts.sum(axis=1) > 0)
     return Lexicon.from_counts(
         counts,
@@ -75,18 +105,8 @@ def seed_batches(count: int, seed: int, stream: int, batch: int = BATCH) -> Iter
 
 
 def hearable(env: Environment[Any], rollout: Rollout) -> NDArray[np.bool_]:
-    """Return which messages (T, B, N) a person would hear: sent by others, gate open, while the trial lasts.
-
-    A message that is held for the whole episode counts once. Where no person plays, all that are sent.
-    """
-    sent = rollout.gates & rollout.alive
-    if env.message_held:
-        sent[1:] = False
-    if isinstance(env, TrafficJunction):
-        sent[..., -1] = False  # the participant's own seat
-        lasts = np.arange(len(sent))[:, None] < trials(rollout).steps  # (T, B)
-        sent &= lasts[..., None]
-    return sent
+    """Return which messages (T, B, N) a person would hear: of those that might be sent, gate open."""
+    return chances(env, rollout) & rollout.gates
 
 
 def vectors(policy: Policy) -> NDArray[np.float64]:

@@ -28,7 +28,7 @@ def root(tmp_path: Path) -> Path:
     return tmp_path / "bundles"
 
 
-@pytest.mark.parametrize("command", ["train", "evaluate", "interpret", "release", "reproduce", "bundles"])
+@pytest.mark.parametrize("command", ["train", "evaluate", "interpret", "figures", "release", "reproduce", "bundles"])
 def test_every_command_explains_itself(command: str) -> None:
     done = run(command, "--help")
     assert done.exit_code == 0
@@ -118,13 +118,16 @@ def test_interpret_writes_lexicon_summary_and_figures(root: Path, tmp_path: Path
         "distances.svg",
         "heatmaps.svg",
         "lexicon.json",
+        "null-threshold.svg",
         "null-tokens.svg",
         "prototypes.svg",
         "summary.json",
         "token-use.svg",
+        "tokens.csv",
     ]
     assert json.loads((out / "lexicon.json").read_text())["samples"] == 200
     assert "200 messages" in done.stdout
+    assert "parent_child: no traffic" in done.stdout
 
 
 def test_bundles_lists_what_is_whole_and_exits_1_if_any_is_broken(root: Path) -> None:

@@ -66,7 +66,9 @@ def test_a_perfect_claim_has_skill_one_and_the_base_rate_has_skill_zero() -> Non
     perfect = judge(overlay(cars.astype(float).tolist(), cars.tolist()), cars, 200, seed=0)
     base = np.tile(cars.mean(axis=0), (200, 1))
     ignorant = judge(overlay(base.tolist(), cars.tolist()), cars, 200, seed=0)
-    assert perfect.brier_skill == pytest.approx(1)
+    assert (perfect.brier, perfect.brier_skill) == (0, pytest.approx(1))
+    assert ignorant.brier == pytest.approx((cars.mean(axis=0) * (1 - cars.mean(axis=0))).mean())
+    assert ignorant.brier == pytest.approx(ignorant.brier_base)
     assert ignorant.brier_skill == pytest.approx(0)
 
 

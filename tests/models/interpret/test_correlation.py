@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from models.interpret.correlation import distances, mean_locations
+from models.interpret.correlation import EVEN, TOO_FEW, distances, mean_locations
 from models.policies.lexicon import Lexicon
 
 CORNERS = np.zeros((4, 25), int)
@@ -24,8 +24,38 @@ def test_prototypes_laid_out_like_the_grid_correlate_perfectly() -> None:
     assert len(found.pairs) == 6
 
 
-def test_equally_distant_prototypes_have_no_correlation_to_speak_of() -> None:
-    assert np.isnan(distances(lexicon(), np.eye(4), (5, 5)).r2)
+def test_equally_distant_prototypes_have_an_r2_of_0_by_definition_and_say_why() -> None:
+    found = distances(lexicon(), np.eye(4), (5, 5))
+    assert (found.r2, found.r2_ci95, found.reason) == (0, None, EVEN)
+    assert np.isnan(found.slope)
+
+
+def test_two_tokens_are_too_few_for_a_line() -> None:
+    found = distances(lexicon(CORNERS[:2]), np.eye(2), (5, 5))
+    assert np.isnan(found.r2)
+    assert found.reason == TOO_FEW
+
+
+def test_a_perfect_line_has_no_doubt() -> None:
+    found = distances(lexicon(), mean_locations(lexicon(), (5, 5)) * 0.5, (5, 5))
+    assert found.r2_ci95 == pytest.approx((1, 1))
+    assert found.slope_ci95 == pytest.approx((2, 2))
+
+
+def test_resampling_tokens_doubts_more_than_resampling_pairs_would() -> None:
+    rng = np.random.default_rng(0)
+    counts = np.zeros((25, 25), int)
+    np.fill_diagonal(counts, 100)
+    places = mean_locations(lexicon(counts), (5, 5))
+    vectors = places + rng.normal(size=places.shape) * 2
+    found = distances(lexicon(counts), vectors, (5, 5), seed=1)
+    assert found.slope_ci95 is not None
+    x, y = found.prototype, found.place
+    draws = rng.integers(0, len(x), (500, len(x)))
+    naive = np.quantile([np.polyfit(x[d], y[d], 1)[0] for d in draws], [0.025, 0.975])
+    low, high = found.slope_ci95
+    assert low < found.slope < high
+    assert high - low > 1.3 * np.ptp(naive)
 
 
 def test_r2_is_the_squared_pearson_correlation() -> None:

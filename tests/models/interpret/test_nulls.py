@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from models.interpret.nulls import in_use, information
+from models.interpret.nulls import in_use, information, kinds, sensitivity
 from models.policies.lexicon import Lexicon
 
 
@@ -33,3 +33,25 @@ def test_of_many_tokens_a_tenth_of_an_even_share_is_use() -> None:
 def test_nothing_said_is_nothing_in_use() -> None:
     assert not in_use(np.zeros(9)).any()
     assert in_use(np.zeros((3, 0))).shape == (3, 0)
+
+
+def test_tokens_are_null_for_three_reasons() -> None:
+    counts = np.array(
+        [[300, 0, 0, 0], [0, 300, 0, 0], [50, 60, 50, 50], [0, 0, 100, 100], [1, 0, 0, 0], [0] * 4]
+    )
+    assert kinds(Lexicon.from_counts(counts, positions=np.full((6, 2), 0.5))) == (1, 1, 1, 3)
+
+
+def test_the_threshold_in_use_gives_the_null_tokens_and_a_higher_one_never_fewer() -> None:
+    rng = np.random.default_rng(0)
+    counts = np.array(
+        [rng.multinomial(800, rng.dirichlet(np.full(12, a))) for a in np.geomspace(0.1, 90, 30)]
+    )
+    lexicon = Lexicon.from_counts(counts, positions=np.full((30, 2), 0.5))
+    rows = {row.threshold: row for row in sensitivity(lexicon)}
+    assert list(rows) == [0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5]
+    assert rows[0.1].tokens == lexicon.null.sum()
+    assert rows[0.1].messages == pytest.approx(information(lexicon).null_messages)
+    tokens = [row.tokens for row in rows.values()]
+    assert tokens == sorted(tokens)
+    assert tokens[0] < tokens[2] < tokens[-1]
