@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from models.envs.api import Environment
     from models.evaluate import Survey
-    from models.interpret.summary import Meaning
     from models.policies.api import Policy
     from models.policies.bundle import PolicyBundle
 
@@ -202,7 +201,7 @@ def interpret(
     _write_json(out / "summary.json", numbers)
     tokens.write(meaning, out / "tokens.csv")
     written = figures.write(figures.figures(env, meaning), out, png=png)
-    _print_meaning(held, meaning, numbers)
+    _print_meaning(held, numbers)
     names = ", ".join(path.name for path in written)
     typer.echo(f"written to {out}: lexicon.json, summary.json, tokens.csv, {names}")
 
@@ -461,7 +460,7 @@ def _print_table(table: Table) -> None:
     Console(width=width).print(table)
 
 
-def _print_meaning(held: PolicyBundle, meaning: Meaning, numbers: dict[str, Any]) -> None:
+def _print_meaning(held: PolicyBundle, numbers: dict[str, Any]) -> None:
     from models.card import meaning_lines
 
     typer.echo(
@@ -470,5 +469,5 @@ def _print_meaning(held: PolicyBundle, meaning: Meaning, numbers: dict[str, Any]
     )
     for line in meaning_lines(numbers):
         typer.echo(line)
-    if meaning.traffic is None:
+    if "left_out" in numbers:
         typer.echo(f"{held.manifest.task}: {numbers['left_out']}")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from models.envs.traffic_junction import TrafficJunction
 from models.evaluate import Measure, Question, evaluate
 from models.interpret.mute import WithoutNulls
+from models.interpret.turns import for_people
 from models.policies.team import Team
 
 if TYPE_CHECKING:
@@ -24,12 +24,12 @@ def removal(
 ) -> dict[str, Any] | None:
     """Measure a policy before and after its null messages are gated; None if it sends none.
 
-    By start (`init`, in traffic also `human`), then `before` and `after`, then measure.
+    By start (`init`, and `human` where there are human trials), then `before` and `after`, then measure.
     """
     if not lexicon.uses[lexicon.null].any():
         return None
     starts: tuple[Literal["init", "human"], ...] = ("init",)
-    if isinstance(env, TrafficJunction):
+    if for_people(env):
         starts = ("init", "human")
     players = {"before": Team(env, policy), "after": Team(env, WithoutNulls(policy, lexicon.null))}
     return {

@@ -1,7 +1,8 @@
 """Make a lexicon: let a policy live in the situations that people meet, and count where it was when it spoke.
 
 Traffic Junction: human-trial starts, the policy in every seat; counted is what the participant's seat would
-hear while its trial lasts. Parent & Lost Child: random starts; the child's one message of each episode.
+hear while its trial lasts. (Easy has no room for human trials: its own starts, every message of every seat.)
+Parent & Lost Child: random starts; the child's one message of each episode.
 Predator-Prey: random starts; every message of every seat.
 
 Shapes: T steps, B episodes, N seats, K tokens, C cells.
@@ -15,9 +16,8 @@ import numpy as np
 
 from models import rng
 from models.bursts import Windows, windows
-from models.envs.traffic_junction import TrafficJunction
 from models.interpret.plane import drawn, principal
-from models.interpret.turns import Turns, chances, turns
+from models.interpret.turns import Turns, chances, for_people, turns
 from models.policies.lexicon import Lexicon
 from models.policies.team import Team
 from models.rollout import Rollout, episodes
@@ -93,7 +93,7 @@ def lives(
 ) -> Iterator[Rollout]:
     """Play `count` episodes of the kind that people meet, greedily, batch by batch."""
     team = Team(env, policy)
-    start: Literal["init", "human"] = "human" if isinstance(env, TrafficJunction) else "init"
+    start: Literal["init", "human"] = "human" if for_people(env) else "init"
     for seeds in seed_batches(count, seed, stream, batch):
         yield episodes(env, team, seeds, start=start)
 

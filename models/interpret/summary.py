@@ -15,6 +15,7 @@ from models.interpret.estimate import EPISODES, lexicon, listen, vectors
 from models.interpret.nulls import in_use, information, kinds, sensitivity
 from models.interpret.shared import Shared, shared
 from models.interpret.traffic import Traffic, traffic
+from models.interpret.turns import for_people
 
 if TYPE_CHECKING:
     from models.envs.api import Environment
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 EPISODES_ELSEWHERE = 2_000
 """Of a task that does not say how many it needs."""
 NO_TRAFFIC = "no traffic: rates along the route, lanes, gas and brake, and calibration are left out"
+NO_TRIALS = "no room for human trials: counted in its own episodes, all seats; calibration is left out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +39,7 @@ class Meaning:
         place: what a token tells about the cell of its speaker.
         bursts: message rates in stretches of five steps; None where messages are held, or nobody lived.
         traffic: what only traffic can tell; None elsewhere.
-        calibration: whether the caution overlay can be believed; None outside Traffic Junction.
+        calibration: whether the caution overlay can be believed; None where there are no human trials.
     """
 
     lexicon: Lexicon
@@ -59,8 +61,9 @@ def interpret(env: Environment[Any], policy: Policy, seed: int, count: int | Non
     burst = None if env.message_held else bursts(windows)
     if not isinstance(env, TrafficJunction):
         return Meaning(table, far, place, burst)
-    judged = calibrate(env, policy, table, seed, max(episodes // 4, 1))
-    return Meaning(table, far, place, burst, traffic(env, turns, policy.tokens, seed), judged)
+    found = traffic(env, turns, policy.tokens, seed)
+    judged = calibrate(env, policy, table, seed, max(episodes // 4, 1)) if for_people(env) else None
+    return Meaning(table, far, place, burst, found, judged)
 
 
 def summary(meaning: Meaning) -> dict[str, Any]:
@@ -78,8 +81,8 @@ def summary(meaning: Meaning) -> dict[str, Any]:
         numbers["traffic"] = _traffic(meaning.traffic)
     if meaning.calibration is not None:
         numbers["calibration"] = {truth: _plain(judged) for truth, judged in meaning.calibration.items()}
-    if meaning.traffic is None:
-        numbers["left_out"] = NO_TRAFFIC
+    if meaning.calibration is None:
+        numbers["left_out"] = NO_TRAFFIC if meaning.traffic is None else NO_TRIALS
     return numbers
 
 

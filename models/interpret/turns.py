@@ -10,10 +10,11 @@ Shapes: T steps, B episodes, N seats, M turns.
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 
+from models.envs.starts import has_room
 from models.envs.traffic_junction import TrafficJunction
 from models.rollout import trials
 
@@ -80,11 +81,16 @@ def chances(env: Environment[Any], rollout: Rollout) -> NDArray[np.bool_]:
     turn = rollout.alive & env.speaks
     if env.message_held:
         turn[1:] = False
-    if isinstance(env, TrafficJunction):
+    if for_people(env):
         turn[..., -1] = False  # the participant's own seat
         lasts = np.arange(len(turn))[:, None] < trials(rollout).steps  # (T, B)
         turn &= lasts[..., None]
     return turn
+
+
+def for_people(env: Environment[Any]) -> TypeGuard[TrafficJunction]:
+    """Return whether episodes are human trials: traffic with room for them."""
+    return isinstance(env, TrafficJunction) and has_room(env)
 
 
 def _entered(rollout: Rollout) -> NDArray[np.bool_]:

@@ -28,7 +28,9 @@ def root(tmp_path: Path) -> Path:
     return tmp_path / "bundles"
 
 
-@pytest.mark.parametrize("command", ["train", "evaluate", "interpret", "figures", "release", "reproduce", "bundles"])
+@pytest.mark.parametrize(
+    "command", ["train", "evaluate", "interpret", "figures", "release", "reproduce", "bundles"]
+)
 def test_every_command_explains_itself(command: str) -> None:
     done = run(command, "--help")
     assert done.exit_code == 0

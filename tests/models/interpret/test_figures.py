@@ -172,3 +172,13 @@ def test_a_token_that_nobody_says_has_no_lane_and_no_action_to_draw(tmp_path: Pa
     charts = figures.figures(MEDIUM, interpret(MEDIUM, policy, seed=1, count=10))
     (path,) = figures.write({"lanes-and-actions": charts["lanes-and-actions"]}, tmp_path)
     assert "What does it do?" in texts(path)
+
+
+def test_the_smallest_crossing_has_no_human_trials_and_is_read_in_its_own_episodes(tmp_path: Path) -> None:
+    env = registry.make("traffic_junction/easy")
+    made = interpret(env, Honest(env), seed=1, count=100)
+    assert made.calibration is None
+    assert made.traffic is not None
+    assert len(made.traffic.lanes.names) == 2
+    assert summary(made)["left_out"].startswith("no room for human trials")
+    assert "rate-along-route" in figures.figures(env, made)
