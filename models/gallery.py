@@ -39,7 +39,7 @@ HEAD = """# Figures of meaning
 This page and its pictures are written by `hatlab figures --out docs/figures` (`make figures`), from the
 released agents, seed {seed}{count}. They redraw the subjects of figures 4 to 8 of Karten et al. 2023 from our
 agents; files are named by what they show. What each number means, and how it is counted:
-[Interpret](../agents-guide.md#interpret).
+[Interpret](../agents.md#interpret).
 """
 
 
