@@ -19,7 +19,7 @@ from models.policies import bundle, scripted
 from models.policies.bundle import Manifest, PolicyBundle
 from models.policies.team import Team
 from models.removal import removal
-from models.training import held
+from models.training import checkpoint, held
 from models.training.held import Provenance, Run, RunError
 
 if TYPE_CHECKING:
@@ -29,8 +29,6 @@ if TYPE_CHECKING:
     from models.policies.api import Policy
     from models.policies.architectures import StoredPolicy
 
-RESUME = "resume.safetensors"
-"""From which an unfinished run goes on elsewhere; a released one needs it no longer."""
 SEED = 7
 EPISODES = 5_000
 TOKENS_MAX = {"parent_child": 9}
@@ -64,7 +62,7 @@ def release(
     run = _finished(run_dir)
     manifest = _manifest(run, name or run.recipe.name, Provenance.read(run_dir))
     made = publish(run_dir, manifest, run.policy, root, episodes, lexicon_episodes)
-    (run_dir / RESUME).unlink(missing_ok=True)
+    checkpoint.discard_resume(run_dir)
     return made
 
 

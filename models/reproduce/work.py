@@ -9,7 +9,6 @@ import json
 import os
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
@@ -26,9 +25,8 @@ from models.training.config import Recipe, RecipeError
 from models.training.trainer import fingerprint
 
 BOOK = "cell.json"
-"""In the run's folder: the weights that it started from, CPU seconds so far."""
+"""In the run's folder: the weights that it started from."""
 NICE = 10
-BOOK_EVERY_S = 5.0  # what a kill may lose of the count
 CURVE = ("total", "env_steps", "success", "reward", "message_rate")
 COSTS = ("env_steps", "cpu_minutes")
 REFUSED = 2
@@ -94,17 +92,13 @@ def do(job: Job) -> None:
 
 def _goes_on(folder: Path, recipe: Recipe, start: str | None) -> bool:
     """Whether the folder is of this recipe and these first weights, or empty."""
-    if not _begun(folder) or not (folder / held.RECIPE).exists():
+    if not checkpoint.exists(folder) or not (folder / held.RECIPE).exists():
         return True
     try:
         content = training.config.load(folder / held.RECIPE).model_dump(mode="json")
     except RecipeError:
         return False
     return same_recipe(content, recipe) and _book(folder).get("start", start) == start
-
-
-def _begun(folder: Path) -> bool:
-    return any((folder / name).exists() for name in (checkpoint.FILE, "resume.safetensors"))
 
 
 def _set_aside(folder: Path) -> None:
@@ -120,14 +114,14 @@ def _set_aside(folder: Path) -> None:
 def _train(shelf: Shelf, cell: Cell, start: str | None) -> None:
     folder = shelf.run(cell)
     folder.mkdir(parents=True, exist_ok=True)
-    if not _begun(folder) or not (folder / held.RECIPE).exists():
+    if not checkpoint.exists(folder) or not (folder / held.RECIPE).exists():
         text = (shelf.recipes / f"{cell.recipe}.toml").read_text(encoding="utf-8")
         (folder / held.RECIPE).write_text(held.with_seed(text, cell.seed), encoding="utf-8")
         held.Provenance.here().write(folder)
     if (folder / checkpoint.FILE).exists() and checkpoint.read(folder).facts["finished"]:
         return
-    with _counted(folder, start):
-        training.run(folder / held.RECIPE, folder, resume=True, progress=False, bundles=shelf.bundles)
+    _replace(folder / BOOK, json.dumps({"start": start}) + "\n")
+    training.run(folder / held.RECIPE, folder, resume=True, progress=False, bundles=shelf.bundles)
 
 
 @contextmanager
@@ -136,30 +130,6 @@ def _alone(path: Path) -> Iterator[None]:
     with path.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
-
-
-@contextmanager
-def _counted(folder: Path, start: str | None) -> Iterator[None]:
-    """Add this process's CPU seconds to those in the folder's book, every few seconds and at the end."""
-    spent, begun, done = _book(folder).get("cpu_s", 0.0), time.process_time(), threading.Event()
-
-    def write() -> None:
-        book = {"start": start, "cpu_s": round(spent + time.process_time() - begun, 1)}
-        _replace(folder / BOOK, json.dumps(book) + "\n")
-
-    def keep() -> None:
-        while not done.wait(BOOK_EVERY_S):
-            write()
-
-    write()
-    keeper = threading.Thread(target=keep, daemon=True)
-    keeper.start()
-    try:
-        yield
-    finally:
-        done.set()
-        keeper.join()
-        write()
 
 
 def _book(folder: Path) -> dict[str, Any]:
@@ -204,8 +174,8 @@ def cost(
     shelf: Shelf, cell: Cell, recipe: Recipe, run: held.Run, rows: list[dict[str, str]]
 ) -> dict[str, Any]:
     """Environment steps and CPU minutes: of this run, and with those of the agents that it starts from."""
-    cpu_s = rows[-1].get("cpu_s") or _book(shelf.run(cell)).get("cpu_s")
-    minutes = None if cpu_s is None else round(float(cpu_s) / 60, 2)  # the log of version 0.1 does not know
+    cpu_s = rows[-1].get("cpu_s")  # the log of version 0.1 does not know
+    minutes = round(float(cpu_s) / 60, 2) if cpu_s else None
     own = {"updates": run.updates, "env_steps": run.steps, "cpu_minutes": minutes}
     before: dict[str, Any] = {"env_steps_before": 0, "cpu_minutes_before": 0.0}
     ancestor = shelf.ancestor(cell)
