@@ -107,7 +107,7 @@ def gas_by_token(deeds: Deeds) -> Chart:
         for token in np.flatnonzero(deeds.uses).tolist()
     ]
     base = chart(rows).encode(
-        x=alt.X("share:Q", title="share of messages", axis=alt.Axis(format="%")),
+        x=alt.X("share:Q", title="share of messages", axis=alt.Axis(format="%", tickCount=5)),
         y=alt.Y("gas:Q", title="speakers that gas in the same step", **_shares()),
     )
     used = sorted((row for row in rows if row["share"] >= 0.002), key=lambda row: (row["gas"], row["token"]))
