@@ -65,7 +65,9 @@ def train(
     recipe: Annotated[
         str, typer.Argument(metavar="RECIPE", help="TOML file, or the name of a packaged one.")
     ],
-    out: Annotated[Path | None, typer.Option(help="Folder of the run; runs/<recipe> if absent.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the run.", show_default="runs/<recipe>-<seed>")
+    ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on from the folder's last checkpoint.")
     ] = False,
@@ -81,10 +83,10 @@ def train(
     from models.training import checkpoint, held
 
     source = _recipe_path(recipe)
-    folder = out or Path("runs") / source.stem
     try:
-        training.config.load(source)
+        own_seed = training.config.load(source).seed
         training.device.find(device)
+        folder = out or Path("runs") / f"{source.stem}-{own_seed if seed is None else seed}"
         own = _own_recipe(source, folder, seed, keep=resume or checkpoint.exists(folder))
         if not (checkpoint.exists(folder) and (folder / held.PROVENANCE).exists()):
             held.Provenance.here().write(folder)

@@ -163,6 +163,19 @@ def test_train_and_release_make_a_bundle_that_evaluates(
     assert json.loads(done.stdout)["task"] == "parent_child"
 
 
+def test_a_run_lives_where_runs_that_start_from_it_look(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    text = RECIPE.format(channel="prototype", tokens=9, updates=1)
+    Path("short.toml").write_text(text)
+    Path("next.toml").write_text('init_from = "run:short"\n' + text)
+    assert "runs/short-8" in refused("train", "next.toml", "--seed", 8)
+    assert run("train", "short.toml", "--seed", 8).exit_code == 0
+    assert run("train", "next.toml", "--seed", 8).exit_code == 0
+    assert Path("runs/next-8/log.csv").exists()
+
+
 def test_train_refuses_what_it_cannot_do_in_one_line(tmp_path: Path) -> None:
     assert "no such file; packaged recipes" in refused("train", "nothing")
     wrong = tmp_path / "wrong.toml"
