@@ -20,7 +20,7 @@ def talk(sent: list[int]) -> Rollout:
     return Rollout(
         nothing, np.ones_like(gates), nothing, gates, nothing, nothing.astype(np.float32),
         np.zeros((len(sent) + 1, 1, 1), np.bool_), np.zeros((len(sent) + 1, 1, 1), np.bool_),
-        np.array([True]), np.array([len(sent)], np.int32), np.array([1], np.int32),
+        np.array([True]), np.array([len(sent)], np.int32), np.array([1], np.int32), nothing, nothing,
     )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ def rollout(alive: list[list[int]], collided: list[list[int]], completed: list[l
     marks = [np.array(rows, np.bool_)[:, None] for rows in (collided, completed)]
     return Rollout(
         nothing, living, nothing, living, nothing, nothing.astype(np.float32), *marks,
-        np.array([True]), np.array([len(alive)], np.int32), np.array([3], np.int32),
+        np.array([True]), np.array([len(alive)], np.int32), np.array([3], np.int32), nothing, nothing,
     )  # fmt: skip
 
 
