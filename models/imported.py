@@ -14,9 +14,8 @@ measured on its own weights, lexicon, refusals, card.
 import tomllib
 import zipfile
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import torch
@@ -28,7 +27,7 @@ from models.policies import bundle
 from models.policies.architectures import ARCHITECTURES, StoredPolicy
 from models.policies.bundle import BundleError, Manifest, PolicyBundle
 from models.policies.recurrent import Architecture
-from models.release import EPISODES, publish
+from models.release import EPISODES, manifest_of, publish
 
 DESCRIPTION, SAFETENSORS, NPZ = "policy.toml", "weights.safetensors", "weights.npz"
 Size = Annotated[int, Field(ge=1, le=bundle.SIZE_MAX)]
@@ -144,24 +143,16 @@ def build(said: Description, stored: Mapping[str, Tensor]) -> StoredPolicy:
 
 
 def _manifest(said: Description, policy: StoredPolicy, name: str) -> Manifest:
-    sizes: dict[str, Any] = policy.architecture.to_dict()
-    channel, gate = sizes.pop("channel"), sizes.pop("gate")
-    return Manifest(
-        format=bundle.FORMAT,
+    return manifest_of(
+        policy,
         name=name,
         task=said.task,
-        task_version=registry.make(said.task).version,
-        channel=channel,
-        gate=gate,
         budget=said.budget,
-        sizes=sizes,
         seed=said.seed,
         steps_trained=said.steps_trained,
         warm_start=said.warm_start,
         recipe={"imported": said.model_dump(mode="json")},
         git_commit="not trained here",
-        created=datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z"),
-        files={},
         architecture=said.architecture,
     )
 

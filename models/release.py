@@ -125,24 +125,33 @@ def _finished(run_dir: Path) -> Run:
 
 def _manifest(run: Run, name: str, provenance: Provenance) -> Manifest:
     recipe = run.recipe
-    sizes = run.policy.architecture.to_dict()
-    channel, gate = sizes.pop("channel"), sizes.pop("gate")
-    return Manifest(
-        format=bundle.FORMAT,
+    return manifest_of(
+        run.policy,
         name=name,
         task=recipe.task,
-        task_version=registry.make(recipe.task).version,
-        channel=channel,
-        gate=gate,
         budget=recipe.budget,
-        sizes=sizes,
         seed=recipe.seed,
         steps_trained=run.steps,
         warm_start=recipe.warm_start,
         recipe=recipe.model_dump(mode="json"),
         git_commit=provenance.git_commit,
+    )
+
+
+def manifest_of(policy: StoredPolicy, *, task: str, **origin: Any) -> Manifest:
+    """Return the manifest of weights that are to be published now; `origin` is what they do not tell."""
+    sizes: dict[str, Any] = policy.architecture.to_dict()
+    channel, gate = sizes.pop("channel"), sizes.pop("gate")
+    return Manifest(
+        format=bundle.FORMAT,
+        task=task,
+        task_version=registry.make(task).version,
+        channel=channel,
+        gate=gate,
+        sizes=sizes,
         created=datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z"),
         files={},
+        **origin,
     )
 
 
