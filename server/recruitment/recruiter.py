@@ -1,7 +1,7 @@
 """What hatlab asks of a marketplace, whichever it is: one protocol, and the plain values that go through it.
 
-Money is in minor units (cents, pence) of the account's currency. A recruiter knows nothing of our database; it
-says what the marketplace says. It never rejects anybody: there is no such method.
+Money is in minor units (cents, pence) of the account's currency. A recruiter knows nothing of our database;
+it says what the marketplace says. It never rejects anybody: there is no such method.
 """
 
 from collections.abc import Mapping, Sequence
@@ -60,7 +60,7 @@ class Posting:
 
 @dataclass(frozen=True, slots=True)
 class Posted:
-    """A posting at the marketplace: its id there, its state, how many places it offers, where to look at it."""
+    """A posting at the marketplace: its id there, its state, how many places it offers, its page there."""
 
     id: str
     state: PostingState
@@ -91,7 +91,7 @@ class Bonus:
     amount_minor: int
     reason: str
     request: str
-    """Deterministic name of this payment, unique per person, submission and purpose; at most 64 characters."""
+    """Name of this payment, the same at every attempt, unique to it; at most 64 characters."""
 
 
 @dataclass(frozen=True, slots=True)
