@@ -16,9 +16,9 @@ from models.envs import registry
 from models.envs.grid import STAY
 from models.envs.parent_child import CHILD
 from models.vocabulary import SILENT
-from server.domain import canonical, events, participation, trial, view
+from server.domain import canonical, events, plan, trial, view
 from server.domain.events import Body, Move, Said
-from server.domain.participation import Round
+from server.domain.plan import Round
 from server.domain.spec import BundleName, Condition, Panel, TrialSpec
 from server.domain.study import StudyDefinition, from_json
 from server.domain.trial import Trial
@@ -150,8 +150,8 @@ def person(study: StudyDefinition, seed: int) -> Person:
     """Let a made-up person play the whole session."""
     random = Random(seed)
     role_order = study.role_orders[seed % len(study.role_orders)]
-    plan = participation.plan(study, role_order, seed)
-    return Person(role_order, tuple(play(spec_of(study, each), each, random) for each in plan.rounds))
+    planned = plan.plan(study, role_order, seed)
+    return Person(role_order, tuple(play(spec_of(study, each), each, random) for each in planned.rounds))
 
 
 def fill(lab: Lab, slug: str, people: int, *, models: int = 8, first: int = 0, **changes: Any) -> int:

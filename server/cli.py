@@ -167,7 +167,16 @@ def simulate(
 
     settings = settings_of_environment()
     signer = TimestampSigner(secret_key(settings), salt="robot")
-    crowd = Crowd(study, participants, seed, url or settings.public_url, style.value, concurrency, rate)
+    crowd = Crowd(
+        study,
+        participants,
+        seed,
+        url or settings.public_url,
+        style.value,
+        concurrency,
+        rate,
+        answers=right_answers(settings, study),
+    )
     complete = run(crowd, lambda: signer.sign(study).decode(), Console())
     raise typer.Exit(0 if complete else 1)
 
@@ -195,6 +204,22 @@ def secret_key(settings: "Settings") -> str:
     if not database.is_current():
         raise NotReadyError("no secret key to sign robots with: set HATLAB_SECRET_KEY or run `hatlab init`")
     return secret_of(settings, database)
+
+
+def right_answers(settings: "Settings", slug: str) -> dict[str, str]:
+    """What robots answer to quiz and attention checks, from this database; empty without it."""
+    from server.domain.study import answer_key, from_json
+    from server.storage import studies
+    from server.storage.database import Database
+
+    database = Database(settings.database_url)
+    if not database.is_current():
+        return {}
+    with database.reading() as db:
+        row = studies.by_slug(db, slug)
+        version = studies.newest_version(db, row.id) if row else None
+    database.close()
+    return answer_key(from_json(version.definition)) if version else {}
 
 
 def main() -> None:

@@ -1,125 +1,160 @@
-"""A session as a plan: its pages and its rounds follow from the study, the arm and the participant's seed.
+"""Where somebody stands in a study, and what every event does to that: one total function.
 
-Pages: `instructions:<block>`, then `play:<block>` (practice rounds, then main rounds), for each block; then
-`complete`. A round is counted over the whole session from 1, practice included. All arms play the same
-situations; the order is drawn per participant.
+A participant is in exactly one `State`. `after(state, event)` is defined for every pair: most events move
+nobody who is not waiting for them. What is stored is a status (the end that somebody came to, or `active`)
+and a page of the plan; the stages of an active participant follow from the page (`stage_of`).
+
+Nobody is ever rejected by us: `REJECTED` and `RETURNED` are what a marketplace tells. Whoever the study could
+not take or who failed the quiz is screened out, which is not a rejection.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping
+from enum import StrEnum
 
-from models import rng
-from server.domain.spec import Phase
-from server.domain.study import Role, StudyDefinition
-
-# Streams of word(seed, stream, step, index). Seed of a study's situations: step = situation, index = role.
-SITUATIONS, PRACTICE_SITUATIONS = 64, 65
-# Seed of a participant: step = role for the order of its rounds.
-ROUND_ORDER, SIGN_PLACES, SIGN_NUMBERS = 66, 67, 68
-ROLES: tuple[Role, ...] = ("parent", "child", "driver")
-SEED_SHIFT = 11  # 53 bits: exact in JavaScript and in spreadsheets
-
-PageKind = Literal["instructions", "play", "complete"]
-COMPLETE = "complete"
+from server.domain.plan import page_kind
 
 
-@dataclass(frozen=True, slots=True)
-class Round:
-    """One trial to come."""
-
-    round: int
-    block: int
-    phase: Phase
-    role: Role
-    number: int
-    """Within the role and phase, from 1."""
-    of: int
-    situation: int
-    """Which of the study's situations, from 1; practice has its own."""
-    seed: int
-    last: bool
-    """The last round of its block."""
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    rounds: tuple[Round, ...]
-    pages: tuple[str, ...]
-    blocks: int
-
-    def of_block(self, block: int) -> tuple[Round, ...]:
-        return tuple(r for r in self.rounds if r.block == block)
-
-    def page_after(self, page: str) -> str:
-        return self.pages[min(self.pages.index(page) + 1, len(self.pages) - 1)]
+class State(StrEnum):
+    INVITED = "invited"
+    """Has a link, and nothing else; nothing is known of them."""
+    SCREENED = "screened"
+    """The browser can do what the study needs. Only the browser knows that."""
+    CONSENTED = "consented"
+    INSTRUCTED = "instructed"
+    PRACTISED = "practised"
+    QUIZZED = "quizzed"
+    PLAYING = "playing"
+    """Block and trial follow from the page and the stored rounds."""
+    SURVEYED = "surveyed"
+    """All rounds are over; the last questions are open."""
+    FINISHED = "finished"
+    DECLINED = "declined"
+    SCREENED_OUT = "screened_out"
+    FAILED = "failed"
+    """Went through everything, but failed too many attention checks: thanked, and looked at by a person."""
+    TIMED_OUT = "timed_out"
+    WITHDRAWN = "withdrawn"
+    RETURNED = "returned"
+    REJECTED = "rejected"
 
 
-def plan(study: StudyDefinition, role_order: str, seed: int) -> Plan:
-    """The session of a participant with this seed."""
-    roles = roles_of(role_order)
-    rounds: list[Round] = []
-    for block, role in enumerate(roles, start=1):
-        rounds += block_rounds(study, block, role, seed, first=len(rounds) + 1)
-    pages = [f"{kind}:{block}" for block in range(1, len(roles) + 1) for kind in ("instructions", "play")]
-    return Plan(tuple(rounds), (*pages, COMPLETE), len(roles))
+class Event(StrEnum):
+    DEVICE_FITS = "device_fits"
+    DEVICE_UNFIT = "device_unfit"
+    AGREE = "agree"
+    DECLINE = "decline"
+    READ = "read"
+    """Went on from the instructions."""
+    PRACTICE_OVER = "practice_over"
+    QUIZ_PASSED = "quiz_passed"
+    QUIZ_MISSED = "quiz_missed"
+    """A wrong answer, with a try left."""
+    QUIZ_FAILED = "quiz_failed"
+    """A wrong answer at the last try."""
+    ROUND_OVER = "round_over"
+    BLOCK_OVER = "block_over"
+    ROUNDS_OVER = "rounds_over"
+    """The last block is over."""
+    ALL_ANSWERED = "all_answered"
+    """Nothing is left to do."""
+    ALL_ANSWERED_INATTENTIVE = "all_answered_inattentive"
+    """Nothing is left to do, but the study's rule excludes these data."""
+    WITHDRAW = "withdraw"
+    PLACE_LOST = "place_lost"
+    """Came back after the lease, and the place had been taken."""
+    RETURN_TOLD = "return_told"
+    """The marketplace says that the place was given back."""
+    TIME_OUT_TOLD = "time_out_told"
+    REJECTION_TOLD = "rejection_told"
+    TOOK_AGAIN = "took_again"
+    """Came back under a new submission."""
 
 
-def roles_of(role_order: str) -> tuple[Role, ...]:
-    """Roles in the order of their blocks; `parent-child` is parent first."""
-    return tuple(role for name in role_order.split("-") for role in ROLES if role == name)
+STAGES = (
+    State.CONSENTED,
+    State.INSTRUCTED,
+    State.PRACTISED,
+    State.QUIZZED,
+    State.PLAYING,
+    State.SURVEYED,
+)
+"""An active participant is in one of these, in this order (what a study leaves out is skipped)."""
+BEFORE = (State.INVITED, State.SCREENED)
+ENDS = tuple(state for state in State if state not in {*STAGES, *BEFORE})
+
+ACTIVE = "active"
+"""Status of everybody in one of the stages."""
+
+MOVES: Mapping[tuple[State, Event], State] = {
+    (State.INVITED, Event.DEVICE_FITS): State.SCREENED,
+    (State.INVITED, Event.DEVICE_UNFIT): State.SCREENED_OUT,
+    (State.SCREENED, Event.DEVICE_UNFIT): State.SCREENED_OUT,
+    (State.SCREENED, Event.AGREE): State.CONSENTED,
+    (State.SCREENED, Event.DECLINE): State.DECLINED,
+    (State.INVITED, Event.DECLINE): State.DECLINED,
+    (State.CONSENTED, Event.READ): State.INSTRUCTED,
+    (State.INSTRUCTED, Event.PRACTICE_OVER): State.PRACTISED,
+    (State.PRACTISED, Event.QUIZ_PASSED): State.QUIZZED,
+    (State.PRACTISED, Event.QUIZ_FAILED): State.SCREENED_OUT,
+    (State.QUIZZED, Event.ROUND_OVER): State.PLAYING,
+    (State.PLAYING, Event.BLOCK_OVER): State.CONSENTED,
+    (State.PLAYING, Event.ROUNDS_OVER): State.SURVEYED,
+    (State.SURVEYED, Event.ALL_ANSWERED): State.FINISHED,
+    (State.SURVEYED, Event.ALL_ANSWERED_INATTENTIVE): State.FAILED,
+    **{(stage, Event.WITHDRAW): State.WITHDRAWN for stage in STAGES},
+    **{(stage, Event.PLACE_LOST): State.TIMED_OUT for stage in STAGES},
+    **{(stage, Event.RETURN_TOLD): State.RETURNED for stage in STAGES},
+    **{(stage, Event.TIME_OUT_TOLD): State.TIMED_OUT for stage in STAGES},
+    **{(stage, Event.REJECTION_TOLD): State.REJECTED for stage in STAGES},
+    (State.TIMED_OUT, Event.RETURN_TOLD): State.RETURNED,
+    (State.TIMED_OUT, Event.REJECTION_TOLD): State.REJECTED,
+    (State.RETURNED, Event.REJECTION_TOLD): State.REJECTED,
+    (State.RETURNED, Event.TOOK_AGAIN): State.CONSENTED,
+    (State.TIMED_OUT, Event.TOOK_AGAIN): State.CONSENTED,
+}
+"""Every pair that moves somebody. `TOOK_AGAIN` leads back to the stage of the page that was left."""
 
 
-def page_kind(page: str) -> tuple[PageKind, int]:
-    """Kind and block of a page; `complete` has block 0."""
-    kind, _, block = page.partition(":")
-    if kind == "instructions":
-        return "instructions", int(block)
-    return ("play", int(block)) if kind == "play" else ("complete", 0)
+def after(state: State, event: Event) -> State:
+    """Where `event` leads somebody who is in `state`; the same state where it leads nowhere."""
+    return MOVES.get((state, event), state)
 
 
-def block_rounds(study: StudyDefinition, block: int, role: Role, seed: int, first: int) -> list[Round]:
-    main = permutation(seed, ROUND_ORDER, ROLES.index(role), study.trials_per_block)
-    order: list[tuple[Phase, int]] = [("practice", n) for n in range(study.practice_rounds)]
-    order += [("main", n) for n in main]
-    numbers = {"practice": study.practice_rounds, "main": study.trials_per_block}
-    return [
-        Round(
-            round=first + index,
-            block=block,
-            phase=phase,
-            role=role,
-            number=index + 1 - (study.practice_rounds if phase == "main" else 0),
-            of=numbers[phase],
-            situation=situation + 1,
-            seed=situation_seed(study, phase, role, situation),
-            last=index == len(order) - 1,
-        )
-        for index, (phase, situation) in enumerate(order)
-    ]
+def moves(state: State, event: Event) -> bool:
+    return (state, event) in MOVES
 
 
-def situation_seed(study: StudyDefinition, phase: Phase, role: Role, situation: int) -> int:
-    """The seed of a world; the same for every participant and arm. `situation` counts from 0 here."""
-    stream = SITUATIONS if phase == "main" else PRACTICE_SITUATIONS
-    return rng.word(study.situation_seed, stream, situation, ROLES.index(role)) >> SEED_SHIFT
+def stage_of(page: str, *, last_block: bool, begun: bool) -> State:
+    """The stage of an active participant.
+
+    Args:
+        page: of the plan.
+        last_block: whether no block comes after the page's.
+        begun: whether a main round of the page's block has ended.
+    """
+    kind, block = page_kind(page)
+    if kind == "play":
+        return State.PLAYING if begun else State.QUIZZED
+    if kind == "survey" and block and not last_block:
+        return State.PLAYING
+    return {
+        "instructions": State.CONSENTED,
+        "practice": State.INSTRUCTED,
+        "quiz": State.PRACTISED,
+    }.get(kind, State.SURVEYED)
 
 
-def permutation(seed: int, stream: int, step: int, size: int) -> list[int]:
-    """A uniformly drawn order of 0 … size - 1 (Fisher-Yates)."""
-    order = list(range(size))
-    for last in range(size - 1, 0, -1):
-        other = rng.below(rng.word(seed, stream, step, last), last + 1)
-        order[last], order[other] = order[other], order[last]
-    return order
+def state_of(status: str, stage: State) -> State:
+    """The state behind a stored status, given the stage of the page."""
+    return stage if status == ACTIVE else State(status)
 
 
-def missing(plan: Plan, ended: Sequence[tuple[int, str | None]]) -> list[int]:
-    """The rounds that have not ended, given (round, outcome) of the stored ones."""
-    done = {ordinal for ordinal, outcome in ended if outcome is not None}
-    return [r.round for r in plan.rounds if r.round not in done]
-
-
-def has_left(status: str, last_seen_utc: str, lease_began_utc: str) -> bool:
-    """Whether an unfinished participant no longer holds a place: unseen since before the lease began."""
-    return status != "finished" and last_seen_utc < lease_began_utc
+def diagram() -> str:
+    """The moves as a Mermaid state diagram, one arrow a pair of states."""
+    arrows: dict[tuple[State, State], list[str]] = {}
+    for (state, event), target in MOVES.items():
+        arrows.setdefault((state, target), []).append(event.value.replace("_", " "))
+    lines = ["stateDiagram-v2", "  direction TB", "  [*] --> invited"]
+    lines += [f"  {a} --> {b}: {', '.join(events)}" for (a, b), events in arrows.items()]
+    lines += [f"  {state} --> [*]" for state in ENDS]
+    return "\n".join(lines)

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, StringConstraints, Validation
 from models.envs import registry
 from server.domain import canonical
 from server.domain.errors import DefinitionError
+from server.domain.questionnaire import AttentionCheck, Questionnaire, QuizQuestion, repeated
 
 Task = Literal["parent_child", "traffic_junction"]
 Communication = Literal["prototype", "one-hot", "shuffled"]
@@ -31,6 +32,9 @@ ROLE_ORDERS: dict[Task, tuple[str, ...]] = {
     "parent_child": ("parent-child", "child-parent"),
     "traffic_junction": ("driver",),
 }
+
+RESERVED = frozenset({"quiz", "attention", "probe"})
+"""Forms that are no questionnaires of a study."""
 
 Slug = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,47}$")]
 Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
@@ -63,6 +67,50 @@ class Texts(Part):
     """Shown above the built-in instructions of every block; usually empty."""
     declined: Paragraph
     complete: Paragraph
+    language: Annotated[str, StringConstraints(pattern=r"^[a-z]{2,3}(-[A-Za-z0-9]{2,8})*$")] = "en"
+    """BCP 47 language of these texts: what screen readers pronounce and browsers hyphenate by."""
+    direction: Literal["ltr", "rtl"] = "ltr"
+
+
+class Codes(Part):
+    """What a participant hands in at the marketplace, by outcome; an empty one: there is no code for it.
+
+    The code of who finished is the study's `completion_code`.
+    """
+
+    screened_out: Code | Literal[""] = ""
+    failed: Code | Literal[""] = ""
+    """Empty: whoever failed too many attention checks gets the code of who finished."""
+    withdrawn: Code | Literal[""] = ""
+
+
+class Gate(Part):
+    """What a browser must be able to do before consent is asked for."""
+
+    width_min: int = Field(default=1024, ge=320, le=4_000)
+    """CSS pixels of the window's inside."""
+    height_min: int = Field(default=640, ge=240, le=4_000)
+    refresh_min_hz: float = Field(default=20, ge=0, le=240)
+    """Measured frame rate; 0: any."""
+    keyboard: bool = True
+
+
+class Pay(Part):
+    """Money, in minor units (pence, cents) of `currency`. Nothing is paid beyond the two caps."""
+
+    currency: Literal["GBP", "USD", "EUR"] = "GBP"
+    reward_minor: int = Field(ge=0, le=100_000)
+    """For who went through everything, also with failed attention checks."""
+    partial_minor: int = Field(default=0, ge=0, le=100_000)
+    """For who withdrew after consent."""
+    screen_out_minor: int = Field(default=0, ge=0, le=100_000)
+    bonus_success_minor: int = Field(default=0, ge=0, le=100_000)
+    """For each main round that was won (found; arrived)."""
+    bonus_max_minor: int = Field(default=0, ge=0, le=100_000)
+    cap_participant_minor: int = Field(ge=0, le=1_000_000)
+    """Most that one person can get, reward and bonus together."""
+    cap_study_minor: int = Field(ge=0, le=1_000_000_000)
+    """Most that the study can spend on rewards and bonuses."""
 
 
 class StudyDefinition(Part):
@@ -91,10 +139,26 @@ class StudyDefinition(Part):
     """A participant who has not been seen for longer no longer holds a place."""
     situation_seed: int = Field(ge=0, lt=2**53)
     """Root of the situations, which are the same for every arm."""
+    gate: Gate = Gate()
+    quiz: tuple[QuizQuestion, ...] = Field(default=(), max_length=40)
+    """Comprehension questions after the practice of a role; who fails at the last try is screened out."""
+    quiz_tries: int = Field(default=2, ge=1, le=5)
+    attention: tuple[AttentionCheck, ...] = Field(default=(), max_length=20)
+    attention_failures: int = Field(default=2, ge=1, le=20)
+    """So many failed checks, and the data are excluded. Nobody is stopped or rejected for them."""
+    questionnaires: tuple[Questionnaire, ...] = Field(default=(), max_length=20)
+    token_probe: bool = False
+    """Parent & Lost Child: after the rounds, where does each sign point?"""
+    codes: Codes = Codes()
+    pay: Pay | None = None
 
     @property
     def role_orders(self) -> tuple[str, ...]:
         return ROLE_ORDERS[self.task]
+
+    @property
+    def roles(self) -> frozenset[str]:
+        return frozenset(role for order in self.role_orders for role in order.split("-"))
 
     @property
     def places(self) -> int:
@@ -105,6 +169,18 @@ class StudyDefinition(Part):
         """Every bundle that somebody in this study may need."""
         named = {arm.bundle for arm in self.arms}
         return frozenset(named | {self.panel_bundle} if self.panel_bundle else named)
+
+    @property
+    def main_rounds(self) -> int:
+        """Main rounds of a session."""
+        return self.trials_per_block * len(self.role_orders[0].split("-"))
+
+    def quiz_of(self, role: Role) -> tuple[QuizQuestion, ...]:
+        """The questions before the main rounds of a role."""
+        return tuple(question for question in self.quiz if question.role in {None, role})
+
+    def questionnaires_at(self, when: Literal["block", "end"]) -> tuple[Questionnaire, ...]:
+        return tuple(each for each in self.questionnaires if each.when == when)
 
     @cached_property
     def canonical(self) -> str:
@@ -153,6 +229,19 @@ def from_json(text: str) -> StudyDefinition:
     return StudyDefinition.model_validate_json(text)
 
 
+def answer_key(study: StudyDefinition) -> dict[str, str]:
+    """Right answers by `quiz.<key>` and `attention.<key>`, with some number for every number: for robots."""
+    right = {f"quiz.{question.key}": str(question.answer) for question in study.quiz}
+    right |= {f"attention.{check.key}": str(check.answer) for check in study.attention}
+    for asked in study.questionnaires:
+        for item in asked.items:
+            if item.kind == "number":
+                right[f"{asked.key}.{item.key}"] = f"{(item.minimum + item.maximum) // 2:g}"
+            elif item.kind == "text":
+                right[f"{asked.key}.{item.key}"] = "from a robot"
+    return right
+
+
 def path(location: tuple[int | str, ...]) -> str:
     return ".".join(str(part) for part in location)
 
@@ -165,6 +254,10 @@ def contradictions(study: StudyDefinition) -> Iterator[tuple[str, str]]:
         yield "panel_bundle", "Parent & Lost Child needs one, Traffic Junction has none"
     if study.step_limit > (steps_max := registry.make(study.environment).steps_max):
         yield "step_limit", f"at most {steps_max} in {study.environment}: an episode ends there"
+    yield from question_contradictions(study)
+    yield from name_contradictions(study)
+    if study.pay is not None:
+        yield from money_contradictions(study.pay)
     if study.completion_url and "{code}" not in study.completion_url:
         yield "completion_url", "must contain {code}"
     seen: set[str] = set()
@@ -174,6 +267,49 @@ def contradictions(study: StudyDefinition) -> Iterator[tuple[str, str]]:
         seen.add(arm.name)
         if arm.communication not in COMMUNICATIONS[study.task]:
             yield f"arms.{index}.communication", f"{arm.communication} is not used in {study.task}"
+
+
+def question_contradictions(study: StudyDefinition) -> Iterator[tuple[str, str]]:
+    """Questions that cannot be asked as they stand."""
+    for index, question in enumerate(study.quiz):
+        if question.role is not None and question.role not in study.roles:
+            yield f"quiz.{index}.role", f"nobody plays the {question.role} in {study.task}"
+    for index, check in enumerate(study.attention):
+        if check.after > study.main_rounds:
+            yield f"attention.{index}.after", f"a session has only {study.main_rounds} main rounds"
+    if study.token_probe and study.task != "parent_child":
+        yield "token_probe", "only Parent & Lost Child has a panel of signs to ask about"
+    if len({check.after for check in study.attention}) < len(study.attention):
+        yield "attention", "two checks come after the same round"
+
+
+def keys_of(study: StudyDefinition) -> Iterator[tuple[str, list[str]]]:
+    """Every list whose parts are told apart by a key, with the keys."""
+    yield "quiz", [question.key for question in study.quiz]
+    yield "attention", [check.key for check in study.attention]
+    yield "questionnaires", [each.key for each in study.questionnaires]
+    for index, each in enumerate(study.questionnaires):
+        yield f"questionnaires.{index}.items", [item.key for item in each.items]
+
+
+def name_contradictions(study: StudyDefinition) -> Iterator[tuple[str, str]]:
+    for name, keys in keys_of(study):
+        if (twice := repeated(keys)) is not None:
+            yield name, f"{twice} is the key of two"
+    for index, each in enumerate(study.questionnaires):
+        if each.key in RESERVED:
+            yield f"questionnaires.{index}.key", f"{each.key} is a name of hatlab's own; use another"
+
+
+def money_contradictions(pay: Pay) -> Iterator[tuple[str, str]]:
+    """Payments that the caps could never allow."""
+    most = pay.reward_minor + pay.bonus_max_minor
+    if pay.cap_participant_minor < most:
+        yield "pay.cap_participant_minor", f"reward and largest bonus are {most} together"
+    if pay.bonus_success_minor and not pay.bonus_max_minor:
+        yield "pay.bonus_max_minor", "a bonus for each success needs a maximum"
+    if pay.cap_study_minor < pay.cap_participant_minor:
+        yield "pay.cap_study_minor", "is less than what one person can get"
 
 
 def misfits(study: StudyDefinition, offers: Mapping[str, Offer]) -> dict[str, str]:

@@ -8,7 +8,7 @@ arms. Both are drawn once, at enrolment, and stored with the participant.
 from collections.abc import Sequence
 
 from models.policies.bundle import PolicyBundle
-from server.domain.participation import SIGN_NUMBERS, SIGN_PLACES, permutation
+from server.domain.plan import SIGN_NUMBERS, SIGN_PLACES, permutation
 from server.domain.spec import Panel
 from server.domain.study import Communication
 

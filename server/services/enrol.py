@@ -1,7 +1,8 @@
 """Coming in: what an entry link leads to, consent, and the draw of the arm in the transaction that ends it.
 
-One person per (study, marketplace, id), also when two tabs consent at once. A preview and a refusal leave no
-data. A person who is in stays in: pausing and closing stop newcomers only.
+One person per (study, marketplace, id), also when two tabs consent at once. A preview leaves no data; of who
+declined or was screened out stay a keyed hash, the status and the date. A person who is in stays in: pausing
+and closing stop newcomers only.
 """
 
 import base64
@@ -12,28 +13,31 @@ from typing import Literal
 
 from itsdangerous import BadSignature, TimestampSigner
 
-from server.domain import allocation, canonical, participation
+from server.domain import allocation, canonical, plan
 from server.domain.allocation import Allocated
 from server.domain.errors import BadInputError, NotFoundError
+from server.domain.participation import Event, State
 from server.domain.study import StudyDefinition
 from server.ghost import panel
 from server.recruitment import recognition
 from server.recruitment.arrival import Arrival
+from server.services import journey, lease
 from server.services.lab import Lab
 from server.services.pages import Page, advance, page_of
-from server.services.session import definition_of
-from server.storage import enrolments, participants, studies
+from server.services.session import definition_of, session_of
+from server.storage import enrolments, journeys, participants, refusals, studies
 from server.storage.database import DbSession
 from server.storage.enrolments import AllocationRow, ConsentRow, IdentityRow
 from server.storage.participants import ParticipantRow
+from server.storage.refusals import RefusalRow
 from server.storage.studies import StudyRow, VersionRow
 
 __all__ = [
-    "Declined",
     "DeviceReport",
     "Enrolled",
     "Entry",
     "Page",
+    "Refused",
     "advance",
     "consent",
     "entry",
@@ -54,7 +58,10 @@ DEVICES = ("desktop", "tablet", "phone")
 UNKNOWN = "unknown"
 TEXT_MAX = 120
 
-EntryKind = Literal["consent", "resume", "preview", "full", "paused", "closed", "not_found"]
+EntryKind = Literal[
+    "consent", "resume", "preview", "full", "paused", "closed", "declined", "screened_out", "not_found"
+]
+Refusal = Literal["declined", "screened_out"]
 Mode = Literal["live", "test", "robot"]
 
 
@@ -90,10 +97,14 @@ class Enrolled:
 
 
 @dataclass(frozen=True, slots=True)
-class Declined:
-    """Nothing was stored."""
+class Refused:
+    """Somebody declined, or cannot take part with this device.
+
+    Of a person whom a marketplace named, the keyed hash, the status and the date were kept; else nothing.
+    """
 
     study: StudyDefinition
+    status: Refusal
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +142,7 @@ def consent(
     agree: bool,
     device: DeviceReport,
     robot: str | None = None,
-) -> Enrolled | Declined | Entry:
+) -> Enrolled | Refused | Entry:
     """End consent: take the person in and draw the arm, or keep nothing.
 
     An `Entry` comes back where the study cannot take the person after all, and (of kind `consent`) where a
@@ -142,15 +153,15 @@ def consent(
         BadInputError: as in `entry`.
     """
     row = studies.by_slug(db, slug)
-    if row is not None and agree:
+    if row is not None:
         row = studies.hold(db, row.id)  # who enrols next must see whom we count now
     visit = visit_of(db, lab, row, params, robot) if row else None
     if visit is None:
         raise NotFoundError(f"there is no study {slug}")
-    if not agree:
-        return Declined(visit.study)
     if known := known_key(db, lab, visit):
         return Enrolled(known)
+    if not agree:
+        return refuse(db, lab, visit, "declined")
     if (kind := kind_of(db, lab, visit)) != "consent":
         return Entry(kind, visit.study)
     if params.get(TEXT, visit.study.consent_sha256) != visit.study.consent_sha256:
@@ -158,14 +169,64 @@ def consent(
     return enrol(db, lab, visit, device)
 
 
+def screen_out(
+    db: DbSession, lab: Lab, slug: str, params: Mapping[str, str], robot: str | None = None
+) -> Refused | Enrolled | Entry:
+    """The device cannot do what the study needs, as the browser itself says. Whoever is in stays in.
+
+    Raises:
+        NotFoundError: no such study.
+        BadInputError: as in `entry`.
+    """
+    row = studies.by_slug(db, slug)
+    visit = visit_of(db, lab, studies.hold(db, row.id), params, robot) if row else None
+    if visit is None:
+        raise NotFoundError(f"there is no study {slug}")
+    if known := known_key(db, lab, visit):
+        return Enrolled(known)
+    if visit.arrival.preview:
+        return Entry("preview", visit.study)
+    return refuse(db, lab, visit, "screened_out")
+
+
+def refuse(db: DbSession, lab: Lab, visit: Visit, status: Refusal) -> Refused | Entry:
+    """Keep that somebody does not take part. The first refusal of a person stands."""
+    hashed = hash_of(lab, visit)
+    if hashed is None:
+        return Refused(visit.study, status)
+    on_date = lab.now_utc()[:10]
+    kept = refusals.add(db, RefusalRow(visit.row.id, hashed, visit.mode, status, on_date))
+    return Refused(visit.study, kind_of_refusal(kept))
+
+
+def kind_of_refusal(kept: RefusalRow) -> Refusal:
+    return "declined" if kept.status == "declined" else "screened_out"
+
+
+def hash_of(lab: Lab, visit: Visit) -> str | None:
+    """The keyed hash of the person's marketplace id; None for who came by a link that names nobody."""
+    arrival = visit.arrival
+    if arrival.external_id is None or arrival.marketplace == "direct":
+        return None
+    return lab.external_hash(arrival.marketplace, arrival.external_id)
+
+
 def come_back(db: DbSession, lab: Lab, key: str, params: Mapping[str, str]) -> None:
     """Keep the submission under which somebody came back, while there is something left to do.
 
     Who returned a task and took it again must end the new one: MTurk takes no form for the old assignment.
+    Whoever had returned or timed out goes on where they left, if a place is free.
     """
     participant, arrival = participant_by_key(db, lab, key), arrival_of(params)
     known = enrolments.identity_of(db, participant.id)
-    if participant.status == "active" and arrival.submission_id not in {None, known.submission_id}:
+    if arrival.submission_id in {None, known.submission_id}:
+        return
+    studies.hold(db, participant.study_id)
+    participant = participants.hold(db, participant.id)
+    if participant.status in {"returned", "timed_out"} and lease.is_free(db, lab, participant):
+        journey.happen(db, lab, session_of(db, lab, participant), Event.TOOK_AGAIN, arrival.marketplace)
+        participant = participants.by_id(db, participant.id)
+    if participant.status == "active":
         parameters = canonical.dumps(dict(arrival.parameters))
         enrolments.renew(db, participant.id, arrival.submission_id or "", parameters)
 
@@ -240,6 +301,8 @@ def known_key(db: DbSession, lab: Lab, visit: Visit) -> str | None:
 
 
 def kind_of(db: DbSession, lab: Lab, visit: Visit) -> EntryKind:
+    if (kept := refusal_of(db, lab, visit)) is not None:
+        return kind_of_refusal(kept)
     if visit.row.status == "paused":
         return "paused"
     if visit.row.status == "closed":
@@ -251,6 +314,11 @@ def kind_of(db: DbSession, lab: Lab, visit: Visit) -> EntryKind:
     counts = counts_of(db, lab, visit)
     places = places_of(visit.study)
     return "consent" if allocation.open_cells(places, visit.study.role_orders, counts) else "full"
+
+
+def refusal_of(db: DbSession, lab: Lab, visit: Visit) -> RefusalRow | None:
+    hashed = hash_of(lab, visit)
+    return refusals.of(db, visit.row.id, hashed) if hashed else None
 
 
 def counts_of(db: DbSession, lab: Lab, visit: Visit) -> dict[tuple[str, str, str], int]:
@@ -291,6 +359,7 @@ def enrol(db: DbSession, lab: Lab, visit: Visit, device: DeviceReport) -> Enroll
             now_utc,
         ),
     )
+    journeys.add(db, participant_id, Event.AGREE, State.CONSENTED, journey.PARTICIPANT, now_utc)
     return Enrolled(key)
 
 
@@ -314,7 +383,7 @@ def participant_row(
         browser=device.browser[:TEXT_MAX],
         viewport=device.viewport[:TEXT_MAX],
         status="active",
-        page=participation.plan(visit.study, drawn.role_order, seed).pages[0],
+        page=plan.plan(visit.study, drawn.role_order, seed).pages[0],
         consented_utc=now_utc,
         last_seen_utc=now_utc,
         finished_utc=None,

@@ -23,7 +23,7 @@ from pydantic_core import from_json  # reads the same values as json, in half th
 
 from server.domain import canonical
 from server.domain.errors import BadInputError, NotFoundError
-from server.domain.participation import has_left
+from server.domain.plan import has_left
 from server.domain.study import from_json as definition_of
 from server.services import codebook, tidy, tracks
 from server.services.lab import Lab

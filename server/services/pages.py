@@ -3,45 +3,68 @@
 A completion code exists only once nothing is missing.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import timedelta
 from typing import Literal
 
-from server.domain import canonical, events, participation
+from server.domain import canonical, events, plan
 from server.domain.errors import CorruptError
-from server.domain.participation import COMPLETE, page_kind
+from server.domain.forms import Form
+from server.domain.participation import ACTIVE, State
+from server.domain.plan import COMPLETE, ROUNDS, page_kind
 from server.domain.study import Role, StudyDefinition
+from server.services import journey
+from server.services.due import due_form
 from server.services.lab import Lab
 from server.services.session import Session, session_of
-from server.storage import enrolments, participants, trials
+from server.storage import answers, enrolments, participants, trials
 from server.storage import events as event_rows
 from server.storage.database import DbSession
 from server.storage.participants import ParticipantRow
 from server.storage.trials import TrialRow
+
+WON = frozenset({"found", "arrived"})
+"""Outcomes of a round that count as a success."""
+
+Kind = Literal["instructions", "play", "form", "end"]
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far somebody is; times run from consent."""
+
+    rounds_over: int
+    """Main rounds of the session that have ended."""
+    rounds: int
+    minutes: int
+    won: int
+    bonus_minor: int
 
 
 @dataclass(frozen=True, slots=True)
 class Page:
     """The page of a participant's present state, with all that its template shows.
 
-    `block`, `role` and what follows from them are those of the last block on the page `complete`.
+    `block`, `role` and what follows from them are those of the last block on pages after it. `form` is there
+    where `kind` is `form`.
     """
 
-    kind: Literal["instructions", "play", "complete"]
+    kind: Kind
     name: str
     """Goes back as `from_page` when the participant goes on."""
+    state: State
     study: StudyDefinition
     role: Role
     block: int
     blocks: int
-    rounds: int
-    """Main rounds of the block."""
-    practice_rounds: int
-    limit: int
-    rounds_stored: int
-    """Main rounds of the session that have ended."""
-    rounds_total: int
-    completion_code: str | None
+    practice: bool
+    """Only practice rounds are played on this page."""
+    form: Form | None
+    progress: Progress
+    code: str | None
+    """To hand in, once an end was reached."""
+    data_kept: bool
     marketplace: str
     parameters: Mapping[str, str]
 
@@ -49,65 +72,98 @@ class Page:
 def page_of(db: DbSession, lab: Lab, participant: ParticipantRow) -> Page:
     session = session_of(db, lab, participant)
     kind, block = page_kind(participant.page)
+    form = due_form(db, session) if participant.status == ACTIVE else None
     block = block or session.plan.blocks
-    main = [r for r in session.plan.rounds if r.phase == "main"]
-    ended = {t.round for t in trials.of_participant(db, participant.id) if t.outcome is not None}
     return Page(
-        kind=kind,
+        kind=shown_as(participant, form),
         name=participant.page,
+        state=journey.state(db, session),
         study=session.study,
         role=session.plan.of_block(block)[0].role,
         block=block,
         blocks=session.plan.blocks,
-        rounds=session.study.trials_per_block,
-        practice_rounds=session.study.practice_rounds,
-        limit=session.study.step_limit,
-        rounds_stored=sum(r.round in ended for r in main),
-        rounds_total=len(main),
-        completion_code=participant.completion_code,
+        practice=kind == "practice",
+        form=form,
+        progress=progress_of(lab, session, trials.of_participant(db, participant.id)),
+        code=participant.completion_code,
+        data_kept=participant.erased_utc is None,
         marketplace=participant.marketplace,
         parameters=canonical.loads(enrolments.identity_of(db, participant.id).parameters),
     )
 
 
+def shown_as(participant: ParticipantRow, form: Form | None) -> Kind:
+    """Which of the templates shows the page."""
+    if participant.status != ACTIVE:
+        return "end"
+    if form is not None:
+        return "form"
+    return "play" if page_kind(participant.page)[0] in ROUNDS else "instructions"
+
+
+def progress_of(lab: Lab, session: Session, rows: Sequence[TrialRow]) -> Progress:
+    main = [row for row in rows if row.phase == "main" and row.outcome is not None]
+    won = sum(row.outcome in WON for row in main)
+    began = canonical.utc_moment(session.participant.consented_utc)
+    ended = session.participant.finished_utc
+    until = canonical.utc_moment(ended) if ended else lab.now()
+    return Progress(
+        rounds_over=len(main),
+        rounds=session.study.main_rounds,
+        minutes=max(0, (until - began) // timedelta(minutes=1)),
+        won=won,
+        bonus_minor=bonus_minor(session.study, won),
+    )
+
+
+def bonus_minor(study: StudyDefinition, won: int) -> int:
+    """What so many successes are worth, by the study's rule."""
+    pay = study.pay
+    return min(won * pay.bonus_success_minor, pay.bonus_max_minor) if pay else 0
+
+
 def advance(db: DbSession, lab: Lab, participant: ParticipantRow, from_page: str) -> None:
     """Go on from a page that asks for nothing else. Whoever is elsewhere by now stays there."""
     session = session_of(db, lab, participant)
-    kind, block = page_kind(participant.page)
-    if from_page != participant.page or kind == "complete":
+    kind, _ = page_kind(participant.page)
+    if from_page != participant.page or participant.status != ACTIVE:
         return
-    if kind == "play" and not block_is_through(db, session, block):
+    if kind not in {"instructions", *ROUNDS} or not page_is_through(db, session):
         return
     turn(db, lab, session)
 
 
-def block_is_through(db: DbSession, session: Session, block: int) -> bool:
+def page_is_through(db: DbSession, session: Session) -> bool:
     ended = {t.round for t in trials.of_participant(db, session.participant.id) if t.outcome is not None}
-    return all(planned.round in ended for planned in session.plan.of_block(block))
+    return all(planned.round in ended for planned in session.plan.of_page(session.participant.page))
 
 
 def turn(db: DbSession, lab: Lab, session: Session) -> None:
     """Turn from the page in `session` to the next one, unless another tab has done so."""
-    before = session.participant.page
-    if participants.hold(db, session.participant.id).page != before:
+    before = session.participant
+    held = participants.hold(db, before.id)
+    if (held.page, held.status) != (before.page, ACTIVE):
         return
-    page = session.plan.page_after(before)
+    page = session.plan.page_after(before.page)
     if page == COMPLETE:
         check_complete(db, session)
-        participants.finish(db, session.participant.id, page, session.study.completion_code, lab.now_utc())
+        journey.finish(db, lab, session)
     else:
-        participants.turn_page(db, session.participant.id, page, lab.now_utc())
+        journey.turned(db, lab, session, page)
 
 
 def check_complete(db: DbSession, session: Session) -> None:
-    """See to it that every round has ended and that its events are all there.
+    """See to it that every round has ended, that its events are all there, and every form.
 
     Raises:
         CorruptError: something is missing.
     """
     rows = trials.of_participant(db, session.participant.id)
-    if absent := participation.missing(session.plan, [(row.round, row.outcome) for row in rows]):
+    if absent := plan.missing(session.plan, [(row.round, row.outcome) for row in rows]):
         raise CorruptError(f"rounds {absent} of {session.participant.id} have not ended")
+    handed_in = answers.attempts(db, session.participant.id)
+    if open_forms := [name for name in plan.forms_of(session.study, session.plan) if name not in handed_in]:
+        raise CorruptError(f"forms {open_forms} of {session.participant.id} were not handed in")
     for row in rows:
         check_chain(db, row)
 

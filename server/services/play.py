@@ -5,15 +5,16 @@ computed before the write lock is taken; the primary key (trial_id, seq) decides
 is shown has been stored.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from server.domain import canonical, events, trial
-from server.domain.errors import BadInputError, NotFoundError, StaleError
-from server.domain.participation import Round, page_kind
+from server.domain.errors import BadInputError, ClosedError, NotFoundError, StaleError
+from server.domain.plan import Round
 from server.domain.view import Heard, Place, View, roads, saw, view_for
-from server.services import fold, pages
+from server.services import fold, lease, pages
+from server.services.due import due_form
 from server.services.fold import Running
 from server.services.lab import Lab
 from server.services.session import Session, place_of, session_of, spec_of
@@ -45,26 +46,28 @@ def open_round(db: DbSession, lab: Lab, participant: ParticipantRow, after: int 
     """The round in hand, or the one after round `after`, which has ended; begins it if need be.
 
     A round that is over stays in hand until the one after it is asked for, so that a reload shows its end
-    again. After the last round of a block the page turns.
+    again. After the last round of a page the page turns; an attention check that is due comes first.
     """
     session = session_of(db, lab, participant)
-    kind, block = page_kind(participant.page)
-    if kind != "play":
+    rounds = session.plan.of_page(participant.page)
+    if not rounds or not lease.keeps(db, lab, participant):
         return PageChange()
     newest = trials.newest(db, participant.id)
-    wanted = wanted_round(session, block, newest, after)
+    wanted = wanted_round(rounds, newest, after)
+    in_hand = wanted is not None and newest is not None and newest.round == wanted.round
+    if not in_hand and due_form(db, session) is not None:
+        return PageChange()
     if wanted is None:
         pages.turn(db, lab, session)
         return PageChange()
-    row = newest if newest and newest.round == wanted.round else begin_round(db, lab, session, wanted)
+    row = newest if newest and in_hand else begin_round(db, lab, session, wanted)
     kept = current(db, lab, row)
     keep_seen(db, lab, participant)
     return {**shown(kept, row.last_seq), "roads": roads(kept.running.trial)}
 
 
-def wanted_round(session: Session, block: int, newest: TrialRow | None, after: int | None) -> Round | None:
-    """The round that is due; None once the block is through."""
-    rounds = session.plan.of_block(block)
+def wanted_round(rounds: Sequence[Round], newest: TrialRow | None, after: int | None) -> Round | None:
+    """Which round of a page is due; None once all are through."""
     if newest is None or newest.round < rounds[0].round:
         return rounds[0]
     goes_on = newest.outcome is not None and after is not None and after >= newest.round
@@ -127,8 +130,11 @@ def decide(
         NotFoundError: the round has not been begun.
         BadInputError: the action is not on offer, or the timing cannot be.
         StaleError: another decision has this seq, or its turn has not come; carries the current view.
+        ClosedError: the participant's session is over.
     """
     events.check_timing(timing)
+    if not lease.keeps(db, lab, participant):
+        raise ClosedError("this session is over; load its page again to see what to do")
     row = trials.of_round(db, participant.id, round)
     if row is None:
         raise NotFoundError(f"round {round} has not been opened")

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 from models.envs import registry
-from server.domain import canonical, participation, study
-from server.domain.participation import Plan, Round
+from server.domain import canonical, plan, study
+from server.domain.plan import Plan, Round
 from server.domain.spec import BundleName, Condition, Panel, SeatHolder, Start, TrialSpec
 from server.domain.study import Arm, StudyDefinition
 from server.domain.view import Place
@@ -31,7 +31,7 @@ class Session:
 def session_of(db: DbSession, lab: Lab, participant: ParticipantRow) -> Session:
     definition = definition_of(db, lab, participant.study_version_id)
     seed = enrolments.allocation_of(db, participant.id).seed
-    return Session(participant, definition, participation.plan(definition, participant.role_order, seed))
+    return Session(participant, definition, plan.plan(definition, participant.role_order, seed))
 
 
 def definition_of(db: DbSession, lab: Lab, version_id: int) -> StudyDefinition:

@@ -14,7 +14,7 @@ from models.policies.lexicon import Lexicon
 from server.domain import canonical, events, trial
 from server.domain.errors import CorruptError, HatlabError
 from server.domain.events import Body
-from server.domain.participation import Round
+from server.domain.plan import Round
 from server.domain.spec import TrialSpec
 from server.domain.trial import Trial
 from server.domain.view import saw

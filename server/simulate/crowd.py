@@ -9,7 +9,7 @@ import hashlib
 import math
 import secrets
 import ssl
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 from urllib.parse import urlsplit
@@ -44,6 +44,8 @@ class Crowd:
     concurrency: int = 20
     rate: float | None = None
     run: str = field(default_factory=lambda: secrets.token_hex(8))
+    answers: Mapping[str, str] = field(default_factory=dict)
+    """Right answers to quiz and attention checks, by `<kind>.<question>`."""
 
     def entry(self, index: int) -> str:
         """Give the link that a marketplace would send robot `index` to."""
@@ -144,6 +146,7 @@ def robot(crowd: Crowd, index: int, browser: Browser) -> Robot:
         stopwatch=Stopwatch(seed, index),
         result=Result(index),
         pace=every(1 / crowd.rate) if crowd.rate else at_once,
+        answers=crowd.answers,
     )
 
 

@@ -26,10 +26,12 @@ class Form:
     buttons: list[tuple[str, str]] = field(default_factory=list)
 
     def filled(self, **values: str) -> dict[str, str]:
-        """Give what is sent when every box is ticked and these fields are set, of those that exist."""
-        known = {
-            name: value for name, value in values.items() if name in self.fields or self.offers(name, value)
-        }
+        """Give what is sent when every box is ticked and these fields are set, of those that exist.
+
+        Of radio buttons the first is ticked where nothing else is asked for.
+        """
+        own = {**self.fields, **self.ticks}
+        known = {name: value for name, value in values.items() if name in own or self.offers(name, value)}
         return {**self.fields, **self.ticks, **known}
 
     def offers(self, name: str, value: str) -> bool:

@@ -2,7 +2,7 @@
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -33,6 +33,10 @@ class Result:
 
     index: int
     finished: bool = False
+    left: bool = False
+    """Walked away before the end, as it was told to."""
+    code: str = ""
+    """What the last page said to hand in."""
     error: str | None = None
     rounds: int = 0
     successes: int = 0
@@ -54,12 +58,16 @@ class Robot:
     stopwatch: Stopwatch
     result: Result
     pace: Callable[[], Any]
+    answers: Mapping[str, str] = field(default_factory=dict)
+    """Right answers by `<kind of form>.<question>`: a robot reads no instructions."""
+    leaves_after: int | None = None
+    """Pages after which the robot walks away without a word; None: it stays to the end."""
 
     async def walk(self) -> Result:
         """Walk the whole flow; whatever stops the robot is kept in `result.error`."""
         try:
             await self._walk()
-            self.result.finished = True
+            self.result.finished = not self.result.left
         except RobotError as error:
             self.result.error = str(error)
         except (httpx.HTTPError, KeyError, TypeError, ValueError, IndexError) as error:
@@ -78,19 +86,35 @@ class Robot:
         if not here.startswith("/p/"):
             raise RobotError(f"no session after consent: {pages.read(response.text).title!r}")
         self.result.key = here.split("/")[2]
-        for _ in range(PAGES_MAX):
+        for number in range(PAGES_MAX):
+            if number == self.leaves_after:
+                self.result.left = True
+                return
             page = pages.read(response.text)
-            onward = page.form_to("/next")
-            if onward is not None:
+            onward, asked = page.form_to("/next"), page.form_to("/answers")
+            if asked is not None:
+                fields = asked.filled(**self._answers_to(asked.fields["form"]))
+                response = page_of(await self.browser.post_form(asked.action, fields))
+            elif onward is not None:
                 response = page_of(await self.browser.post_form(onward.action, onward.filled()))
             elif page.data is not None and "round_url" in page.data:
                 here = await self._play(page.data["round_url"], page.data["step_url"])
                 response = page_of(await self.browser.get(here))
             elif is_complete(page):
+                self.result.code = page.texts["code"]
                 return
             else:
                 raise RobotError(f"a page that leads nowhere: {page.title!r}")
         raise RobotError(f"more than {PAGES_MAX} pages")
+
+    def _answers_to(self, form: str) -> dict[str, str]:
+        """The right answers where there are any, and words where a text is asked for."""
+        kind = form.partition(":")[0]
+        return {
+            f"a.{name.partition('.')[2]}": value
+            for name, value in self.answers.items()
+            if name.partition(".")[0] == kind
+        }
 
     async def _play(self, round_url: str, step_url: str) -> str:
         """Play the rounds of one page; give the address of the next page."""

@@ -29,6 +29,7 @@ class ParticipantRow(NamedTuple):
     last_seen_utc: str
     finished_utc: str | None
     completion_code: str | None
+    erased_utc: str | None = None
 
 
 class CellCount(NamedTuple):
@@ -78,17 +79,44 @@ def turn_page(db: DbSession, participant_id: str, page: str, now_utc: str) -> No
     )
 
 
-def finish(db: DbSession, participant_id: str, page: str, completion_code: str, now_utc: str) -> None:
+def end(
+    db: DbSession,
+    participant_id: str,
+    status: str,
+    page: str,
+    completion_code: str | None,
+    finished_utc: str | None,
+    now_utc: str,
+) -> None:
+    """Somebody comes to an end; `finished_utc` only for who went through everything."""
     db.write(
         update(participant)
         .where(participant.c.id == participant_id)
         .values(
             page=page,
-            status="finished",
+            status=status,
             completion_code=completion_code,
-            finished_utc=now_utc,
+            finished_utc=finished_utc,
             last_seen_utc=now_utc,
         )
+    )
+
+
+def resume(db: DbSession, participant_id: str, now_utc: str) -> None:
+    """Back into the study, on the page that was left."""
+    db.write(
+        update(participant)
+        .where(participant.c.id == participant_id)
+        .values(status="active", completion_code=None, last_seen_utc=now_utc)
+    )
+
+
+def blank(db: DbSession, participant_id: str, now_utc: str) -> None:
+    """Forget what the browser told of itself; what was played and answered goes with `erasure`."""
+    db.write(
+        update(participant)
+        .where(participant.c.id == participant_id)
+        .values(device="unknown", browser="", viewport="", erased_utc=now_utc)
     )
 
 

@@ -83,6 +83,7 @@ participant = Table(
     text("last_seen_utc"),
     text("finished_utc", nullable=True),
     text("completion_code", nullable=True),
+    text("erased_utc", nullable=True),
 )
 
 identity = Table(
@@ -152,6 +153,109 @@ event = Table(
     text("body"),
     text("digest"),
     text("stored_utc"),
+)
+
+answer = Table(
+    "answer",
+    metadata,
+    participant_key(),
+    Column("form", Text, primary_key=True),
+    Column("attempt", Integer, primary_key=True, autoincrement=False),
+    Column("item", Text, primary_key=True),
+    text("value"),
+    Column("correct", Boolean, nullable=True),
+    Column("first_ms", Float(53), nullable=True),
+    Column("last_ms", Float(53), nullable=True),
+    Column("changes", Integer, nullable=True),
+    text("stored_utc"),
+)
+
+browser_event = Table(
+    "browser_event",
+    metadata,
+    participant_key(),
+    Column("visit", Text, primary_key=True),
+    Column("seq", Integer, primary_key=True, autoincrement=False),
+    text("page"),
+    text("kind"),
+    text("value"),
+    Column("at_ms", Float(53), nullable=False),
+    text("stored_utc"),
+)
+
+journey = Table(
+    "journey",
+    metadata,
+    participant_key(),
+    Column("seq", Integer, primary_key=True, autoincrement=False),
+    text("event"),
+    text("state"),
+    text("source"),
+    text("stored_utc"),
+)
+
+refusal = Table(
+    "refusal",
+    metadata,
+    Column("study_id", Integer, ForeignKey("study.id"), primary_key=True),
+    Column("external_hash", Text, primary_key=True),
+    text("mode"),
+    text("status"),
+    text("on_date"),
+)
+
+posting = Table(
+    "posting",
+    metadata,
+    Column("id", Integer, primary_key=True),
+    Column("study_id", Integer, ForeignKey("study.id"), nullable=False, index=True),
+    text("marketplace"),
+    text("external_id"),
+    text("state"),
+    Column("places", Integer, nullable=False),
+    text("content"),
+    text("created_utc"),
+    text("polled_utc", nullable=True),
+    UniqueConstraint("marketplace", "external_id"),
+)
+
+submission = Table(
+    "submission",
+    metadata,
+    Column("posting_id", Integer, ForeignKey("posting.id"), primary_key=True),
+    Column("id", Text, primary_key=True),
+    text("external_hash"),
+    text("state"),
+    text("code"),
+    Column("bonus_minor", Integer, nullable=False),
+    text("told_by"),
+    text("told_utc"),
+)
+
+payment = Table(
+    "payment",
+    metadata,
+    Column("request", Text, primary_key=True),
+    Column("posting_id", Integer, ForeignKey("posting.id"), nullable=False, index=True),
+    text("participant_id"),
+    text("submission_id"),
+    text("kind"),
+    Column("amount_minor", Integer, nullable=False),
+    text("currency"),
+    text("state"),
+    text("reference"),
+    text("detail"),
+    text("asked_by"),
+    text("asked_utc"),
+    text("done_utc", nullable=True),
+)
+
+webhook_event = Table(
+    "webhook_event",
+    metadata,
+    Column("marketplace", Text, primary_key=True),
+    Column("id", Text, primary_key=True),
+    text("received_utc"),
 )
 
 admin = Table(

@@ -6,22 +6,24 @@ are known by their id and get no cookie: the key in the path is all they need, a
 
 import re
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Any
 
 from fastapi import APIRouter, Header, Request
 from starlette.responses import RedirectResponse, Response
 
 from server.domain.errors import NotFoundError
+from server.domain.money import shown
 from server.domain.study import StudyDefinition
 from server.recruitment import mturk
 from server.recruitment.recognition import recognise
 from server.services import enrol
-from server.services.enrol import Declined, DeviceReport, Enrolled, Entry
+from server.services.enrol import DeviceReport, Enrolled, Entry, Refused
 from server.services.lab import Lab
-from server.web import messages
+from server.web import ends, messages
 from server.web.dependencies import CurrentLab, Fields
 from server.web.pages import ConsentPage
 from server.web.rendering import html
+from server.web.session_pages import bonus_rule
 
 router = APIRouter()
 
@@ -30,6 +32,11 @@ PLAIN = re.compile(r"[^\x00-\x1f\x7f]{0,500}")  # a control character in a value
 COOKIE_S = 30 * 86_400
 TEXT_CHANGED = "The text of this page was changed while you had it open. Please read it again."
 TICK_FIRST = "Please tick the box first: it says that you have read this page and agree."
+KEPT_NAMED = (
+    "If you say no, we keep only that you did, with the date and a scrambled form of your identifier, "
+    "so that you are not asked again."
+)
+KEPT_NOBODY = "If you say no, nothing about you is kept."
 Robot = Annotated[str | None, Header(alias="X-Hatlab-Robot", max_length=500)]
 
 
@@ -73,10 +80,33 @@ def give_consent(
         return html(messages.unknown_study(), 404)
     if isinstance(done, Enrolled):
         return into_session(request, lab, slug, params, done.key)
-    if isinstance(done, Declined):
-        said = messages.declined(done.study.title, done.study.texts.declined)
-        return html(said, frames=frames(params))
+    if isinstance(done, Refused):
+        return refused(done, params)
     return consent_again(done, slug, params, TEXT_CHANGED)
+
+
+@router.post("/s/{slug}/screened")
+def screened(request: Request, lab: CurrentLab, slug: str, fields: Fields, robot: Robot = None) -> Response:
+    """The browser says that this device does not fit the study."""
+    params = plain(fields)
+    if not SLUG.fullmatch(slug):
+        return html(messages.unknown_study(), 404)
+    try:
+        with lab.database.writing() as db:
+            done = enrol.screen_out(db, lab, slug, params, robot)
+    except NotFoundError:
+        return html(messages.unknown_study(), 404)
+    if isinstance(done, Enrolled):
+        return into_session(request, lab, slug, params, done.key)
+    if isinstance(done, Refused):
+        return refused(done, params)
+    return page_of_entry(done, slug, params)
+
+
+def refused(done: Refused, params: Mapping[str, str]) -> Response:
+    """What is told to who does not take part; what to hand in and the way back where there is one."""
+    page = ends.refused_page(done.study, done.status, recognise(params), params.get("reason", ""))
+    return html(page, frames=frames(params), forms=mturk.SUBMIT_HOSTS if frames(params) else ())
 
 
 def into_session(request: Request, lab: Lab, slug: str, params: Mapping[str, str], key: str) -> Response:
@@ -131,6 +161,9 @@ def page_of_entry(found: Entry, slug: str, params: Mapping[str, str]) -> Respons
     if found.kind == "consent":
         page = consent_page(found, slug, found.identifiers)
         return html(page, frames=frames(params))
+    if found.kind in {"declined", "screened_out"}:
+        status: enrol.Refusal = "declined" if found.kind == "declined" else "screened_out"
+        return refused(Refused(found.study, status), params)
     return html(messages.of_entry(found.kind, found.study), frames=frames(params))
 
 
@@ -148,16 +181,34 @@ def consent_page(
         facts=facts(study),
         identifiers=identifiers,
         action=f"/s/{slug}/consent",
+        screened_url=f"/s/{slug}/screened",
+        gate=gate(study),
+        kept_text=KEPT_NAMED if enrol.VISIT not in identifiers else KEPT_NOBODY,
+        language=study.texts.language,
+        direction=study.texts.direction,
         error=error,
     )
+
+
+def gate(study: StudyDefinition) -> dict[str, Any]:
+    """What the browser is asked to show before consent."""
+    keys = [["up", "right", "down", "left"]] if study.task == "parent_child" else [["brake"], ["go"]]
+    return {**study.gate.model_dump(), "keys": keys if study.gate.keyboard else []}
 
 
 def facts(study: StudyDefinition) -> tuple[tuple[str, str], ...]:
     return (
         ("Time", f"about {study.duration_min} minutes"),
-        ("Payment", study.reward_text),
+        ("Payment", payment(study)),
         ("You need", "a computer with a keyboard"),
     )
+
+
+def payment(study: StudyDefinition) -> str:
+    if study.pay is None:
+        return study.reward_text
+    reward, rule = shown(study.pay.reward_minor, study.pay.currency), bonus_rule(study)
+    return f"{reward}, and {rule}" if rule else reward
 
 
 def frames(params: Mapping[str, str]) -> tuple[str, ...]:

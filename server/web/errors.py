@@ -68,9 +68,9 @@ def problem(
 
 
 def wants_json(scope: Scope) -> bool:
-    """Whether scripts asked: the two addresses of the play API, and the health check."""
+    """Whether scripts asked: the addresses of the play API, and the health check."""
     path: str = scope["path"]
-    return path == "/healthz" or (path.startswith("/p/") and path.endswith(("/round", "/step")))
+    return path == "/healthz" or (path.startswith("/p/") and path.endswith(("/round", "/step", "/events")))
 
 
 def answer(

@@ -98,7 +98,3 @@ def closed(title: str, contact: str) -> MessagePage:
         ),
         "info",
     )
-
-
-def declined(title: str, text: str) -> MessagePage:
-    return MessagePage(title, "You do not take part", (text,), "good")

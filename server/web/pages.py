@@ -28,6 +28,41 @@ class Action:
 
 
 @dataclass(frozen=True, slots=True)
+class Bar:
+    """What stands at the edge of every page of a session: how far, how long, for what; help and the way out.
+
+    `pay` and `bonus` are finished words (empty: the study states neither); `bonus` is what was earned so far.
+    """
+
+    rounds_over: int
+    rounds: int
+    minutes: int
+    pay: str
+    bonus: str
+    bonus_rule: str
+    contact: str
+    withdraw_url: str
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """One item of a form as its template needs it; `value` is what was answered so far."""
+
+    key: str
+    text: str
+    kind: Literal["choice", "scale", "number", "text", "cell"]
+    options: tuple[tuple[str, str], ...]
+    """Value and label of each answer of a choice; values of a scale (label empty)."""
+    low: str
+    high: str
+    minimum: str
+    maximum: str
+    required: bool
+    value: str
+    error: str
+
+
+@dataclass(frozen=True, slots=True)
 class ConsentPage:
     """The entry page.
 
@@ -46,6 +81,14 @@ class ConsentPage:
     facts: tuple[tuple[str, str], ...]
     identifiers: Mapping[str, str]
     action: str
+    screened_url: str
+    """Where the hidden identifiers are posted to, with `reason`, when the device does not fit."""
+    gate: Mapping[str, Any]
+    """JSON of #gate: width_min, height_min, refresh_min_hz, keyboard, keys (names of keys to press)."""
+    kept_text: str
+    """What is kept of who says no."""
+    language: str
+    direction: str
     error: str | None = None
 
 
@@ -66,6 +109,12 @@ class InstructionsPage:
     paragraphs: tuple[str, ...]
     page: str
     next_url: str
+    quiz: bool
+    """Whether questions about the game follow."""
+    bar: Bar
+    events_url: str
+    language: str
+    direction: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,25 +133,78 @@ class PlayPage:
     step_url: str
     page_url: str
     data: Mapping[str, Any]
+    bar: Bar
+    language: str
+    direction: str
 
 
 @dataclass(frozen=True, slots=True)
-class CompletePage:
-    """The code and the way back.
+class FormPage:
+    """Questions: a quiz, an attention check, a questionnaire, or the probe of the signs.
 
-    With `fields` the way back is a form that posts them to `url` (MTurk), without it is a link (Prolific);
-    without `url` the code is all there is (direct).
+    The form posts to `answers_url`: hidden `form` and `attempt`, for each item `a.<key>` with the answer and
+    `t.<key>` with JSON {first_ms, last_ms, changes}, filled in by the script. `signs` (probe only) are the
+    board's and the tokens' drawing data. `again` says what was wrong at an attempt before.
     """
 
-    template: ClassVar[str] = "participant/complete.html"
+    template: ClassVar[str] = "participant/form.html"
     title: str
+    kind: Literal["quiz", "attention", "questionnaire", "probe"]
+    heading: str
+    lead: str
+    form: str
+    attempt: int
+    tries_left: int
+    items: tuple[Question, ...]
+    again: str
+    error: str
+    answers_url: str
+    data: Mapping[str, Any]
+    """JSON of #page-data: events_url, and for the probe size and signs."""
+    bar: Bar
+    language: str
+    direction: str
+
+
+@dataclass(frozen=True, slots=True)
+class EndPage:
+    """Every end that somebody who was in the study can come to; says what to do next.
+
+    With `fields` the way back is a form that posts them to `url` (MTurk), without it is a link (Prolific);
+    without `url` the code is all there is; without `code` nothing is to be handed in. `paid` lines say what
+    will be paid. `goes_by_itself`: the way back is taken after a countdown.
+    """
+
+    template: ClassVar[str] = "participant/end.html"
+    title: str
+    state: str
+    icon: Icon
+    heading: str
+    paragraphs: tuple[str, ...]
     code: str
     marketplace: str
     url: str | None
     rounds_stored: int
     rounds: int
-    text: str
+    paid: tuple[tuple[str, str], ...]
+    goes_by_itself: bool
+    language: str
+    direction: str
     fields: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class WithdrawPage:
+    """Asks who wants to stop whether the data may be kept; posts `keep` = yes or no to `action`."""
+
+    template: ClassVar[str] = "participant/withdraw.html"
+    title: str
+    partial: str
+    """What will be paid; empty: the study says nothing about it."""
+    action: str
+    back_url: str
+    language: str
+    direction: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""The two addresses that scripts post to while a round is played.
+"""The addresses that scripts post to: a round, a step, and what happens to the browser's window.
 
 Each is one transaction and one thread hop; the answer is canonical JSON, so that equal views are equal bytes.
 """
@@ -10,10 +10,10 @@ from fastapi import APIRouter
 from starlette.responses import Response
 
 from server.domain import canonical
-from server.services import enrol, play
+from server.services import enrol, play, watch
 from server.services.play import PageChange
 from server.web.dependencies import CurrentLab
-from server.web.schemas import RoundBody, StepBody
+from server.web.schemas import BrowserLog, RoundBody, StepBody
 
 router = APIRouter()
 
@@ -45,6 +45,15 @@ def step(lab: CurrentLab, key: str, body: StepBody) -> Response:
         timing = body.timing.model_dump()
         answer = play.decide(db, lab, participant, body.round, body.seq, body.action, timing)
     return json_answer(answer)
+
+
+@router.post("/p/{key}/events", responses=ANSWERS, response_class=Response)
+def browser_events(lab: CurrentLab, key: str, body: BrowserLog) -> Response:
+    """Focus, visibility, size and full screen of the window: kept, never punished."""
+    happened = [(each.seq, each.kind, each.value, each.at_ms) for each in body.events]
+    with lab.database.writing() as db:
+        stored = watch.keep(db, lab, enrol.participant_by_key(db, lab, key), body.visit, body.page, happened)
+    return json_answer({"stored": stored})
 
 
 def json_answer(value: Mapping[str, Any]) -> Response:

@@ -1,4 +1,4 @@
-"""The two bodies that the play API reads: strict, bounded, nothing extra.
+"""The bodies that the play API reads: strict, bounded, nothing extra.
 
 All times are milliseconds of `performance.now()` or differences of it (DESIGN section 7).
 """
@@ -49,3 +49,21 @@ class RoundBody(Body):
     """Asks for the round in hand (`after` null), or for the one after a finished round."""
 
     after: Ordinal | None
+
+
+class BrowserEvent(Body):
+    """Something that happened to the page, `at_ms` after it was loaded."""
+
+    seq: Ordinal
+    kind: Literal["focus", "blur", "visible", "hidden", "resize", "fullscreen", "windowed", "loaded"]
+    value: Annotated[str, Field(max_length=40, pattern=r"^[0-9A-Za-z.:x -]*$")]
+    """Of `resize` and `loaded` the window's inside, like 1280x720."""
+    at_ms: Stamp
+
+
+class BrowserLog(Body):
+    """Some events of one visit to a page, in order; sent again they change nothing."""
+
+    visit: Annotated[str, Field(pattern=r"^[0-9A-Za-z-]{8,40}$")]
+    page: Annotated[str, Field(pattern=r"^[a-z]{1,20}(:[0-9]{1,3})?$")]
+    events: Annotated[list[BrowserEvent], Field(max_length=200)]

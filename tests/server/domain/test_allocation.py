@@ -98,9 +98,7 @@ def test_a_full_arm_is_left_out_and_when_all_are_full_nobody_is_drawn() -> None:
 
 
 def test_the_stream_is_named_once() -> None:
-    from server.domain import participation
+    from server.domain import plan
 
-    streams = [
-        value for name, value in vars(participation).items() if name.isupper() and isinstance(value, int)
-    ]
+    streams = [value for name, value in vars(plan).items() if name.isupper() and isinstance(value, int)]
     assert ALLOCATION not in streams

@@ -13,7 +13,7 @@ from models.envs.traffic_junction import TrafficJunction
 from models.vocabulary import SILENT
 from server.domain import canonical, trial
 from server.domain.events import Said, silence
-from server.domain.participation import permutation
+from server.domain.plan import permutation
 from server.domain.spec import BundleName, Condition, Panel, TrialSpec
 from server.domain.trial import Trial
 from server.domain.view import Heard, Place, Triangle, heading, roads, view_for

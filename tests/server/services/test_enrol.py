@@ -12,9 +12,9 @@ from sqlalchemy import func, select
 from server.domain import allocation, canonical
 from server.domain.errors import BadInputError, NotFoundError
 from server.services import enrol
-from server.services.enrol import Declined, DeviceReport, Enrolled, Entry
+from server.services.enrol import DeviceReport, Enrolled, Entry, Refused
 from server.services.lab import Lab
-from server.storage import enrolments, participants, studies
+from server.storage import enrolments, participants, refusals, studies
 from server.storage.database import Database
 from server.storage.tables import metadata
 from tests.fakes import FakeClock, definition, fake_lab
@@ -28,7 +28,7 @@ def enter(lab: Lab, slug: str, params: dict[str, str], robot: str | None = None)
         return enrol.entry(db, lab, slug, params, robot)
 
 
-def agree(lab: Lab, slug: str, params: dict[str, str], **changes: Any) -> Enrolled | Declined | Entry:
+def agree(lab: Lab, slug: str, params: dict[str, str], **changes: Any) -> Enrolled | Refused | Entry:
     with lab.database.writing() as db:
         given = {"agree": True, "device": DESKTOP} | changes
         return enrol.consent(db, lab, slug, params, **given)
@@ -93,12 +93,32 @@ def test_looking_at_the_entry_page_stores_nothing(lab: Lab, params: dict[str, st
     assert rows(lab.database) == before
 
 
-def test_a_refusal_leaves_no_data(lab: Lab) -> None:
+def test_of_a_refusal_stay_a_keyed_hash_a_status_and_a_date(lab: Lab) -> None:
+    study_id = launch(lab, definition("parent-child"))
+    before = rows(lab.database)
+    assert isinstance(agree(lab, "parent-child", prolific("ada"), agree=False), Refused)
+    assert rows(lab.database) == {**before, "refusal": 1}
+    with lab.database.reading() as db:
+        kept = refusals.of(db, study_id, lab.external_hash("prolific", "ada"))
+    assert kept is not None
+    assert kept[2:] == ("live", "declined", "2026-11-24")
+
+
+def test_who_declined_is_not_taken_in_by_going_back(lab: Lab) -> None:
+    launch(lab, definition("parent-child"))
+    agree(lab, "parent-child", prolific("ada"), agree=False)
+    assert enter(lab, "parent-child", prolific("ada")).kind == "declined"
+    again = agree(lab, "parent-child", prolific("ada"))
+    assert isinstance(again, Entry)
+    assert again.kind == "declined"
+    assert rows(lab.database)["participant"] == 0
+
+
+def test_nothing_stays_of_somebody_whom_nobody_named(lab: Lab) -> None:
     launch(lab, definition("parent-child"))
     before = rows(lab.database)
-    assert isinstance(agree(lab, "parent-child", prolific("ada"), agree=False), Declined)
+    assert isinstance(agree(lab, "parent-child", {}, agree=False), Refused)
     assert rows(lab.database) == before
-    assert enter(lab, "parent-child", prolific("ada")).kind == "consent"
 
 
 def test_a_preview_cannot_consent(lab: Lab) -> None:

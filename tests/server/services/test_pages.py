@@ -30,7 +30,7 @@ def test_a_session_goes_through_its_pages_in_order(lab: Lab) -> None:
     launch(lab, definition("parent-child"))
     key = come_in(lab, "parent-child")
     seen = [page(lab, key)]
-    while seen[-1].kind != "complete":
+    while seen[-1].kind != "end":
         if seen[-1].kind == "play":
             play_block(lab, key)
         else:
@@ -39,10 +39,10 @@ def test_a_session_goes_through_its_pages_in_order(lab: Lab) -> None:
     assert [p.name for p in seen] == ["instructions:1", "play:1", "instructions:2", "play:2", "complete"]
     assert {seen[0].role, seen[2].role} == {"parent", "child"}
     assert [(p.block, p.blocks) for p in seen[:4]] == [(1, 2), (1, 2), (2, 2), (2, 2)]
-    assert [p.rounds_stored for p in seen] == [0, 0, 3, 3, 6]
-    assert seen[-1].rounds_total == 6
-    assert seen[-1].completion_code == "FOUND-CHILD"
-    assert all(p.completion_code is None for p in seen[:-1])
+    assert [p.progress.rounds_over for p in seen] == [0, 0, 3, 3, 6]
+    assert seen[-1].progress.rounds == 6
+    assert seen[-1].code == "FOUND-CHILD"
+    assert all(p.code is None for p in seen[:-1])
     assert seen[0].parameters["PROLIFIC_PID"] == "ada"
 
 
@@ -103,4 +103,4 @@ def test_there_is_no_code_while_anything_is_missing(lab: Lab, damage: object) ->
 def test_everything_that_was_played_is_there_at_the_end(lab: Lab) -> None:
     key = playing(lab, "traffic-junction")
     play_all(lab, key)
-    assert page(lab, key).rounds_stored == page(lab, key).rounds_total == 3
+    assert page(lab, key).progress.rounds_over == page(lab, key).progress.rounds == 3

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks import synthetic
-from server.domain.participation import Round
+from server.domain.plan import Round
 from server.domain.study import read
 from server.services import codebook, studies, tidy, tracks
 from server.services.sheets import Sheet

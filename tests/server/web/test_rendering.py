@@ -14,7 +14,9 @@ PAGES: list[type[Page]] = [
     pages.ConsentPage,
     pages.InstructionsPage,
     pages.PlayPage,
-    pages.CompletePage,
+    pages.EndPage,
+    pages.FormPage,
+    pages.WithdrawPage,
     pages.MessagePage,
     pages.ErrorPage,
 ]

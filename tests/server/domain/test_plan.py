@@ -4,8 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.domain import participation
-from server.domain.participation import permutation, plan
+from server.domain.plan import has_left, missing, permutation, plan
 from tests.fakes import definition
 
 SEEDS = st.integers(0, 2**53 - 1)
@@ -65,13 +64,13 @@ def test_permutations_are_drawn_uniformly() -> None:
 
 def test_rounds_that_have_not_ended_are_named() -> None:
     mine = plan(definition("traffic-junction"), "driver", 1)
-    assert participation.missing(mine, [(1, "arrived"), (2, None), (4, "limit")]) == [2, 3]
+    assert missing(mine, [(1, "arrived"), (2, None), (4, "limit")]) == [2, 3]
 
 
 def test_who_was_not_seen_within_the_lease_has_left() -> None:
-    assert participation.has_left("active", "2026-01-01T00:00:00.000Z", "2026-01-01T00:00:00.001Z")
-    assert not participation.has_left("active", "2026-01-01T00:00:00.001Z", "2026-01-01T00:00:00.001Z")
-    assert not participation.has_left("finished", "2026-01-01T00:00:00.000Z", "2026-01-02T00:00:00.000Z")
+    assert has_left("active", "2026-01-01T00:00:00.000Z", "2026-01-01T00:00:00.001Z")
+    assert not has_left("active", "2026-01-01T00:00:00.001Z", "2026-01-01T00:00:00.001Z")
+    assert not has_left("finished", "2026-01-01T00:00:00.000Z", "2026-01-02T00:00:00.000Z")
 
 
 def test_seeds_are_exact_in_a_spreadsheet() -> None:

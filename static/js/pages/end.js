@@ -20,7 +20,7 @@ copy.addEventListener("click", async () => {
 });
 
 const way = document.querySelector("#return");
-if (way) countDown(/** @type {HTMLElement} */ (way));
+if (way?.hasAttribute("data-by-itself")) countDown(/** @type {HTMLElement} */ (way));
 
 /** @param {HTMLElement} link */
 function countDown(link) {

@@ -1,0 +1,88 @@
+"""The probe of the signs: what the page draws, and how good the marks are against P(cell | token)."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from server.domain import canonical
+from server.services import enrol
+from server.services.lab import Lab
+from server.services.session import Session, session_of
+from server.storage.answers import AnswerRow
+from server.storage.database import DbSession
+
+PREFIX = "sign_"
+
+
+class Mark(NamedTuple):
+    """One mark, and what the token really says."""
+
+    sign: int
+    """Number on the screen."""
+    position: int
+    """Place on the panel."""
+    token: int
+    """Index in the bundle's codebook."""
+    row: int
+    column: int
+    probability: float
+    """P(cell | token) of the marked cell."""
+    best: float
+    """The largest P(cell | token)."""
+    distance: float
+    """Expected number of steps from the marked cell to where the token was said."""
+    least: float
+    """The same for the best cell that could be marked."""
+
+
+def drawing(db: DbSession, lab: Lab, key: str) -> dict[str, Any]:
+    """Size of the board, and number, glyph and place of every sign, as on the participant's own panel."""
+    session = session_of(db, lab, enrol.participant_by_key(db, lab, key))
+    return {"size": 9, "signs": []} if session.study.panel_bundle is None else panel_data(lab, session)
+
+
+def panel_data(lab: Lab, session: Session) -> dict[str, Any]:
+    agent = lab.agent(session.study.panel_bundle or "")
+    numbers = canonical.loads(session.participant.number_permutation)
+    signs = [
+        {"number": number, "position": position, "x": round(float(x), 4), "y": round(float(y), 4)}
+        for position, (number, (x, y)) in enumerate(zip(numbers, agent.lexicon.positions, strict=True))
+    ]
+    return {"size": 9, "signs": signs}
+
+
+def marks(lab: Lab, session: Session, rows: list[AnswerRow]) -> list[Mark]:
+    """Every mark of a participant, scored against the lexicon of the agent that they played with."""
+    lexicon = lab.agent(session.arm.bundle).lexicon
+    places = canonical.loads(session.participant.token_permutation)
+    numbers = canonical.loads(session.participant.number_permutation)
+    found = []
+    for answer in rows:
+        if answer.form != "probe:0" or not answer.value:
+            continue
+        sign = int(answer.item.removeprefix(PREFIX))
+        position = numbers.index(sign)
+        token = places.index(position)
+        row, column = (int(part) for part in answer.value.split(","))
+        found.append(mark(sign, position, token, row, column, np.asarray(lexicon.probability[token])))
+    return found
+
+
+def mark(sign: int, position: int, token: int, row: int, column: int, said: Any, size: int = 9) -> Mark:
+    """Score one mark; `said` is P(cell | token) over size * size cells, row by row."""
+    cells = np.arange(size * size)
+    away = np.abs(cells // size - row) + np.abs(cells % size - column)
+    every = np.abs(cells[:, None] // size - cells[None] // size) + np.abs(
+        cells[:, None] % size - cells[None] % size
+    )
+    return Mark(
+        sign,
+        position,
+        token,
+        row,
+        column,
+        float(said[row * size + column]),
+        float(said.max()),
+        float(said @ away),
+        float((every @ said).min()),
+    )

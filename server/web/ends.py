@@ -1,0 +1,156 @@
+"""What is told at each end that somebody in a study can come to: where they stand, and what to do next."""
+
+from typing import NamedTuple
+
+from server.domain.money import shown
+from server.domain.participation import State as Standing
+from server.domain.study import StudyDefinition
+from server.recruitment.arrival import Arrival, ExitLink
+from server.recruitment.recognition import exit_link
+from server.services.pages import Page as State
+from server.web.pages import EndPage, Icon
+
+
+class Told(NamedTuple):
+    icon: Icon
+    heading: str
+    paragraphs: tuple[str, ...]
+
+
+KEPT = "What you did so far is kept, as you allowed."
+ERASED = (
+    "What you did in the study has been deleted. The identifier that pays you is kept until you are paid."
+)
+WITH_CODE = "Hand in the code below, so that your time is paid."
+BACK = "Please return your place on the site that sent you; that has no consequences for you."
+NO_REJECTION = "This is no rejection, and it has no bad consequences for you."
+DEVICE = "This device or browser cannot show the game as it is meant."
+DEVICES = {
+    "phone": "The game needs a computer with a keyboard; it cannot be played on a phone or a tablet.",
+    "keyboard": "The game is played with a keyboard, and none was found.",
+    "viewport": "The window of this device is too small for the game.",
+    "frames": "This device draws pictures too slowly for the game.",
+    "browser": "This browser is too old for the game.",
+}
+"""By what the browser found out about itself."""
+CONTACT = "If you think that this is a mistake, write to {contact}."
+
+
+def end_page(state: State) -> EndPage:
+    study, told = state.study, told_of(state)
+    code = state.code or ""
+    link = link_of(state, code)
+    through = state.state in {Standing.FINISHED, Standing.FAILED}
+    return EndPage(
+        title=study.title,
+        state=state.state.value,
+        icon=told.icon,
+        heading=told.heading,
+        paragraphs=told.paragraphs,
+        code=code,
+        marketplace=state.marketplace,
+        url=link.url if link else None,
+        fields=link.fields if link else {},
+        rounds_stored=state.progress.rounds_over,
+        rounds=state.progress.rounds,
+        paid=paid_of(state),
+        goes_by_itself=through,
+        language=study.texts.language,
+        direction=study.texts.direction,
+    )
+
+
+def link_of(state: State, code: str) -> ExitLink | None:
+    if not code:
+        return None
+    return exit_link(state.marketplace, code, state.parameters, state.study.completion_url)
+
+
+def told_of(state: State) -> Told:
+    """The words of an end; whoever failed attention checks is thanked like everybody."""
+    study, standing = state.study, state.state
+    contact = CONTACT.format(contact=study.contact)
+    pay = WITH_CODE if state.code else BACK
+    if standing in {Standing.FINISHED, Standing.FAILED}:
+        return Told("good", "Thank you, you are finished", (study.texts.complete,))
+    if standing is Standing.WITHDRAWN:
+        return Told("info", "You have left the study", (KEPT if state.data_kept else ERASED, pay))
+    if standing is Standing.SCREENED_OUT:
+        return Told("info", "The study ends here for you", screened_out(state.code or "", contact))
+    others: dict[Standing, Told] = {
+        Standing.TIMED_OUT: Told(
+            "wait",
+            "Your time for this study is over",
+            (
+                "You were away for a while, and your place has been given to somebody else.",
+                "Your site may let you take a new place: then its link brings you back to where you were.",
+                contact,
+            ),
+        ),
+        Standing.RETURNED: Told(
+            "info",
+            "You have returned your place",
+            (
+                "Nothing more is expected of you.",
+                "If you take a place again on the site that sent you, its link brings you back here.",
+            ),
+        ),
+        Standing.REJECTED: Told(
+            "stop",
+            "This session is closed",
+            ("The site that sent you has closed your submission.", contact),
+        ),
+    }
+    return others[standing]
+
+
+def refused_page(study: StudyDefinition, status: str, arrival: Arrival, reason: str = "") -> EndPage:
+    """The end of who declined, or whose device does not fit, before anything was begun."""
+    declined = status == "declined"
+    code = "" if declined else study.codes.screened_out
+    named = arrival.external_id is not None
+    link = exit_link(arrival.marketplace, code, arrival.parameters, study.completion_url) if code else None
+    back = WITH_CODE if code else BACK if named else "You may close this window."
+    why = (study.texts.declined,) if declined else (DEVICES.get(reason, DEVICE), NO_REJECTION)
+    return EndPage(
+        title=study.title,
+        state=status,
+        icon="info",
+        heading="You do not take part" if declined else "This study needs another device",
+        paragraphs=(*why, *(() if declined and not named else (back,))),
+        code=code if named else "",
+        marketplace=arrival.marketplace,
+        url=link.url if link and named else None,
+        fields=link.fields if link and named else {},
+        rounds_stored=0,
+        rounds=0,
+        paid=(),
+        goes_by_itself=False,
+        language=study.texts.language,
+        direction=study.texts.direction,
+    )
+
+
+def screened_out(code: str, contact: str) -> tuple[str, ...]:
+    why = "Not every question about the game was answered right, so that the rounds cannot start."
+    return (why, NO_REJECTION, WITH_CODE if code else BACK, contact)
+
+
+def paid_of(state: State) -> tuple[tuple[str, str], ...]:
+    """What will be paid, line by line."""
+    pay = state.study.pay
+    if pay is None:
+        return ()
+    amounts = {
+        Standing.FINISHED: pay.reward_minor,
+        Standing.FAILED: pay.reward_minor,
+        Standing.WITHDRAWN: pay.partial_minor,
+        Standing.SCREENED_OUT: pay.screen_out_minor,
+    }
+    lines = []
+    if amounts.get(state.state):
+        lines.append(("For your time", shown(amounts[state.state], pay.currency)))
+    if state.state in {Standing.FINISHED, Standing.FAILED} and pay.bonus_success_minor:
+        won = f"Bonus for {state.progress.won} of {state.progress.rounds} rounds"
+        lines.append((won, shown(state.progress.bonus_minor, pay.currency)))
+    return tuple(lines)
