@@ -39,6 +39,10 @@ class RecruiterError(Exception):
         self.again = again
 
 
+class UncertainError(RecruiterError):
+    """Money may have gone out or not: nobody may send it again before looking at what was paid."""
+
+
 @dataclass(frozen=True, slots=True)
 class Posting:
     """A study as a marketplace offers it."""
