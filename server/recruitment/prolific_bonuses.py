@@ -9,10 +9,10 @@ moves minutes after the answer. So `Bonuses`
 - raises `UncertainError` where an answer was lost.
 
 A crash or a second process ends that memory. The caller therefore keeps a ledger: *proposed*; then *sent*,
-committed before `pay`; then *done*, by what `pay` returns. What is *sent* after a crash or an UncertainError is not
-sent again before `paid` was asked `SETTLED_S` later or more: an amount that is there by then was paid, one that is
-not was not. Equal amounts can only be counted. So if several bonuses of one submission have the same amount, all
-of them go into one call, those that were paid earlier too. One process at a time may pay.
+committed before `pay`; then *done*, by what `pay` returns. What is *sent* after a crash or an UncertainError
+is not sent again before `paid` was asked `SETTLED_S` later or more: an amount that is there by then was paid,
+one that is not was not. Equal amounts can only be counted. So if several bonuses of one submission have the
+same amount, all of them go into one call, those that were paid earlier too. One process at a time may pay.
 """
 
 import threading

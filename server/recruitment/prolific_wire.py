@@ -1,8 +1,7 @@
 """Prolific's studies and submissions as its API writes them, and what they are in our words.
 
 Source: the OpenAPI description at docs.prolific.com. A submission has other names for the same things in a
-list (`participant_id`, `study_code`) than by itself (`participant`, `entered_code`, and `bonus_payments`, which
-lists do not have).
+list (`participant_id`, `study_code`) than by itself (`participant`, `entered_code`), and no bonuses there.
 """
 
 import hashlib
