@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -223,6 +223,10 @@ def participant(fake: FakeProlific) -> APIRouter:
     def plan(body: Json) -> dict[str, int]:
         fake.weather.faults.append(Fault(**body))
         return {"planned": len(fake.weather.faults)}
+
+    @router.get("/faults")
+    def planned() -> list[dict[str, Any]]:
+        return [asdict(each) for each in fake.weather.faults]
 
     @router.get("/ledger")
     def who_was_paid() -> dict[str, Any]:

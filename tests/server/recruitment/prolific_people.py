@@ -48,5 +48,8 @@ class FakePeople:
     def plan_fault(self, **fault: Any) -> None:
         self._client.post("/fake/faults", json=fault).raise_for_status()
 
+    def faults(self) -> Any:
+        return self._client.get("/fake/faults").raise_for_status().json()
+
     def _do(self, taken: Taken, what: str) -> None:
         self._client.post(f"/fake/submissions/{taken.submission_id}/{what}").raise_for_status()
