@@ -5,14 +5,15 @@ moves minutes after the answer. So `Bonuses`
 
 - never sends the paying request twice by itself;
 - looks at the bonuses that each submission has, and takes an equal amount for the payment itself;
-- remembers, while it lives, what it sent, because a payment shows late;
+- remembers, while it lives, what it sent or saw, because a payment shows late;
 - raises `UncertainError` where an answer was lost.
 
 A crash or a second process ends that memory. The caller therefore keeps a ledger: *proposed*; then *sent*,
 committed before `pay`; then *done*, by what `pay` returns. What is *sent* after a crash or an UncertainError
 is not sent again before `paid` was asked `SETTLED_S` later or more: an amount that is there by then was paid,
-one that is not was not. Equal amounts can only be counted. So if several bonuses of one submission have the
-same amount, all of them go into one call, those that were paid earlier too. One process at a time may pay.
+one that is not was not. Equal amounts on one submission can only be counted, so two rules hold for them: all
+of them go into one call, those that were paid earlier too; and none is sent while another is *sent* and
+undecided. One process at a time may pay.
 """
 
 import threading
@@ -35,7 +36,7 @@ ONE_BULK = threading.Lock()  # Prolific does not take two at once
 
 @dataclass(slots=True)
 class Memory:
-    """What was sent: each request's bonus, and its bulk once Prolific said that it took it."""
+    """What was sent or seen: each request's bonus, and its bulk once Prolific said that it took it."""
 
     bonuses: dict[str, Bonus] = field(default_factory=dict)
     bulks: dict[str, str] = field(default_factory=dict)
@@ -85,6 +86,7 @@ class Bonuses:
             if request in self._memory.bulks or seen[place(bonus)] > 0:
                 seen[place(bonus)] -= 1
                 settled[request] = self._memory.bulks.get(request, SEEN)
+                self._remember(bonus, settled[request])
             elif request in self._memory.bonuses:
                 raise UncertainError(
                     f"bonus {request} was sent and its answer lost: look before sending it again"
@@ -122,6 +124,11 @@ class Bonuses:
             self._memory.bulks |= paid
             return paid
         raise UncertainError(f"{reason} ({len(due)} bonuses)")
+
+    def _remember(self, bonus: Bonus, reference: str) -> None:
+        """Keep it, so that a payment that shows later is not taken for this one."""
+        self._memory.bonuses[bonus.request] = bonus
+        self._memory.bulks[bonus.request] = reference
 
     def _forget(self, due: Iterable[str]) -> None:
         for request in due:

@@ -365,6 +365,18 @@ def test_another_process_sees_what_was_paid_once_it_shows(
     assert people.bonuses(taken) == [50, 50, 50]
 
 
+def test_a_payment_of_an_earlier_process_is_not_taken_for_a_new_one_later(
+    recruiter: ProlificRecruiter, connection: Connection, people: FakePeople, study: str
+) -> None:
+    taken = finished(recruiter, people, study)
+    recruiter.pay_bonuses(study, [bonus(taken, 50, "r1")])
+    people.advance(SETTLED_S)
+    later = ProlificRecruiter(connection)
+    for names in (("r2", "r1"), ("r1", "r2"), ("r2", "r1")):  # what is paid now does not show yet
+        later.pay_bonuses(study, [bonus(taken, 50, name) for name in names])
+    assert people.bonuses(taken) == [50, 50]
+
+
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_money_whose_answer_was_lost_is_never_sent_again(
     recruiter: ProlificRecruiter, people: FakePeople, study: str, when: str
