@@ -1,4 +1,4 @@
-"""The command line: `hatlab init | serve | verify | export | simulate`, and the commands of models.cli.
+"""The command line: `hatlab init | serve | verify | export | simulate | …`, and the commands of models.cli.
 
 Exit code 0: done; 1: the check failed; 2: bad input, said in one line on stderr. What is slow to import is
 imported by the command that needs it; `hatlab serve` never loads training.
@@ -179,6 +179,42 @@ def simulate(
     )
     complete = run(crowd, lambda: signer.sign(study).decode(), Console())
     raise typer.Exit(0 if complete else 1)
+
+
+@app.command()
+def fake_prolific(
+    port: Annotated[int, typer.Option(min=0, max=65_535, help="Port to listen on; 0: any free one.")] = 8010,
+    seed: Annotated[int, typer.Option(help="Ids and mishaps follow from it.")] = 1,
+    token: Annotated[str, typer.Option(help="The key that it accepts.")] = "fake-token",  # noqa: S107
+    webhook_url: Annotated[
+        str | None, typer.Option(help="Where changes of submissions are sent, sometimes twice or late.")
+    ] = None,
+    webhook_secret: Annotated[
+        str | None, typer.Option(help="Secret that they are signed with; default: drawn and printed.")
+    ] = None,
+    limit_429: Annotated[
+        float, typer.Option(min=0, max=1, help="Share of requests that are answered: too many.")
+    ] = 0.0,
+    delay: Annotated[
+        float, typer.Option(min=0, max=60, help="Longest delay of an answer, in seconds.")
+    ] = 0.0,
+    lag: Annotated[
+        float, typer.Option(min=0, max=3_600, help="Seconds until a code or a bonus arrives.")
+    ] = 0.0,
+) -> None:
+    """Start a made-up Prolific on this machine, to try recruiting without money and people."""
+    from server.simulate.fake_prolific import FakeProlific, serve
+    from server.simulate.fake_prolific_hooks import Hooks
+    from server.simulate.fake_prolific_market import Market
+    from server.simulate.fake_prolific_weather import Weather
+
+    fake = FakeProlific(
+        token,
+        Market(seed, publishing_s=1.0, submit_lag_s=lag, bonus_lag_s=lag),
+        Weather(seed, limit_429=limit_429, delay_s=delay),
+        Hooks(seed, secret=webhook_secret),
+    )
+    serve(fake, port, webhook_url)
 
 
 def settings_of_environment() -> "Settings":

@@ -37,8 +37,14 @@ class Settings(BaseSettings):
     """Folded trials kept in memory by each worker; 0 turns the cache off. Never changes an answer."""
     body_max_bytes: int = Field(default=262_144, ge=1_024)
     """Largest request body that is read; room for a long consent text in any script, percent-encoded."""
+    prolific_token: SecretStr | None = None
+    """API token of the Prolific account that studies are published from. Unset: recruiting there is off."""
+    prolific_api: str = "https://api.prolific.com/api/v1"
+    """Root of Prolific's API; `hatlab fake-prolific` prints the one of a marketplace to try things with."""
+    prolific_webhook_secret: SecretStr | None = None
+    """Secret that Prolific signs its messages with. Unset: no message is believed, changes are asked for."""
 
-    @field_validator("public_url")
+    @field_validator("public_url", "prolific_api")
     @classmethod
     def an_address(cls, url: str) -> str:
         """What links can begin with, without the final slash."""
@@ -46,7 +52,7 @@ class Settings(BaseSettings):
             raise ValueError("use an address like https://study.example.org")
         return url.rstrip("/")
 
-    @field_validator("secret_key", "admin_password")
+    @field_validator("secret_key", "admin_password", "prolific_token", "prolific_webhook_secret")
     @classmethod
     def not_empty(cls, secret: SecretStr | None) -> SecretStr | None:
         """An empty variable means unset, not an empty secret."""

@@ -39,6 +39,10 @@ class RecruiterError(Exception):
         self.again = again
 
 
+class UncertainError(RecruiterError):
+    """Money may have gone out or not: nobody may send it again before looking at what was paid."""
+
+
 @dataclass(frozen=True, slots=True)
 class Posting:
     """A study as a marketplace offers it."""
@@ -144,13 +148,16 @@ class Recruiter(Protocol):
         ...
 
     def pay_bonuses(self, posting_id: str, bonuses: Sequence[Bonus]) -> Sequence[Paid]:
-        """Pay every one of them, or raise before anything was paid."""
+        """Pay every one of them, or raise before anything was paid; UncertainError: nobody knows which."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """What a webhook says: a submission has another state. `event_id` makes it idempotent."""
+    """What a webhook says: a submission has another state. `event_id` makes it idempotent.
+
+    `posting_id` is empty where the marketplace names only the submission.
+    """
 
     event_id: str
     posting_id: str

@@ -134,6 +134,39 @@ def test_a_server_says_where_it_is_which_agent_it_left_out_and_stops_when_told(h
     assert "broken/manifest.json" in errors
 
 
+def test_a_made_up_prolific_says_what_to_set_and_works_by_that(hatlab: Shell) -> None:
+    with hatlab.started("fake-prolific", "--port", "0", "--webhook-url", "https://x.example/hook") as server:
+        assert server.stdout is not None
+        lines = [server.stdout.readline().strip() for _ in range(5)]
+        told = dict(line.split(" ")[0].split("=", 1) for line in lines if line.startswith("HATLAB_"))
+        answer = httpx.get(
+            f"{told['HATLAB_PROLIFIC_API']}/hooks/subscriptions/",
+            headers={"Authorization": f"Token {told['HATLAB_PROLIFIC_TOKEN']}"},
+            timeout=60,
+        )
+        assert [each["target_url"] for each in answer.json()["results"]] == ["https://x.example/hook"]
+        assert len(told["HATLAB_PROLIFIC_WEBHOOK_SECRET"]) == 64
+        server.terminate()
+        _, errors = server.communicate(timeout=60)
+    assert errors == ""
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--webhook-url", "http://elsewhere.example/"), "--webhook-url"),
+        (("--limit-429", "2"), "--limit-429"),
+    ],
+)
+def test_a_made_up_prolific_refuses_what_it_cannot_do(
+    hatlab: Shell, words: tuple[str, ...], said: str
+) -> None:
+    done = hatlab("fake-prolific", "--port", "0", *words)
+    assert done.returncode == 2
+    assert said in done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
+
+
 def test_every_command_of_the_science_is_mounted() -> None:
     from models.cli import app
 
@@ -145,7 +178,7 @@ def test_every_command_of_the_science_is_mounted() -> None:
 def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:
     done = hatlab("--help")
     assert done.returncode == 0, done.stderr
-    for command in ("init", "serve", "verify", "export", "simulate", *MODELS_COMMANDS):
+    for command in ("init", "serve", "verify", "export", "simulate", "fake-prolific", *MODELS_COMMANDS):
         assert command in done.stdout
 
 
