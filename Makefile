@@ -55,7 +55,7 @@ train: $(RUNTIME) ## train one recipe again: make train RECIPE=models/recipes/â€
 learn: $(DEV) ## slow tests: do the recipes still learn?
 	$(BIN)/python -m pytest -m learn
 
-torture: $(DEV) ## kill -9 the server 20 times under 20 robots, on SQLite and on PostgreSQL
+torture: $(DEV) ## kill -9 the server under robots, and under a whole study with a made-up marketplace
 	$(BIN)/python -m tests.torture
 
 screenshots: $(RUNTIME) $(NODE) ## take the pictures of README and docs again (needs Node 20 and Chromium)
