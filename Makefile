@@ -5,6 +5,8 @@ TORCH_INDEX ?=
 HOST ?= 127.0.0.1
 PORT ?= 8000
 WORKERS ?= 1
+# Processes that share the tests.
+JOBS ?= 2
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -28,7 +30,7 @@ serve: $(RUNTIME) ## install, migrate, make the two demo studies, start the serv
 
 test: $(DEV) $(if $(HAVE_NODE),$(NODE)) ## run all tests (browser tests need Node 20 and Chromium)
 	@.ci/need-browser "$(HAVE_NODE)"
-	$(BIN)/python -m pytest -m "not learn and not torture"
+	$(BIN)/python -m pytest -n $(JOBS) -m "not learn and not torture"
 	$(if $(HAVE_NODE),npm test --silent)
 
 check: $(DEV) $(if $(HAVE_NODE),$(NODE)) ## lint, types, floors: what CI checks
