@@ -8,6 +8,7 @@ import base64
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
 
 from itsdangerous import BadSignature, TimestampSigner
@@ -17,7 +18,7 @@ from server.domain.allocation import Allocated
 from server.domain.errors import BadInputError, NotFoundError
 from server.domain.study import StudyDefinition
 from server.ghost import panel
-from server.recruitment import recognition
+from server.recruitment import personal, recognition
 from server.recruitment.arrival import Arrival
 from server.services.lab import Lab
 from server.services.pages import Page, advance, page_of
@@ -54,7 +55,7 @@ DEVICES = ("desktop", "tablet", "phone")
 UNKNOWN = "unknown"
 TEXT_MAX = 120
 
-EntryKind = Literal["consent", "resume", "preview", "full", "paused", "closed", "not_found"]
+EntryKind = Literal["consent", "resume", "preview", "full", "paused", "closed", "not_invited", "not_found"]
 Mode = Literal["live", "test", "robot"]
 
 
@@ -163,7 +164,7 @@ def come_back(db: DbSession, lab: Lab, key: str, params: Mapping[str, str]) -> N
 
     Who returned a task and took it again must end the new one: MTurk takes no form for the old assignment.
     """
-    participant, arrival = participant_by_key(db, lab, key), arrival_of(params)
+    participant, arrival = participant_by_key(db, lab, key), recognition.recognise(params)
     known = enrolments.identity_of(db, participant.id)
     if participant.status == "active" and arrival.submission_id not in {None, known.submission_id}:
         parameters = canonical.dumps(dict(arrival.parameters))
@@ -193,7 +194,7 @@ def visit_of(
     if robot is not None:
         check_robot(lab, row.slug, robot)
         mode = "robot"
-    return Visit(row, version, definition_of(db, lab, version.id), arrival_of(params), mode)
+    return Visit(row, version, definition_of(db, lab, version.id), arrival_of(lab, row.slug, params), mode)
 
 
 def check_robot(lab: Lab, slug: str, signature: str) -> None:
@@ -206,10 +207,10 @@ def check_robot(lab: Lab, slug: str, signature: str) -> None:
         raise BadInputError("X-Hatlab-Robot: signed for another study")
 
 
-def arrival_of(params: Mapping[str, str]) -> Arrival:
+def arrival_of(lab: Lab, slug: str, params: Mapping[str, str]) -> Arrival:
     """The marketplace's arrival; a direct one is named after its visit, which no marketplace names."""
-    arrival = recognition.recognise(params)
-    if arrival.external_id is not None or arrival.preview:
+    arrival = recognition.recognise(params, partial(personal.name_of, slug=slug, key=lab.secret_key))
+    if arrival.external_id is not None or arrival.preview or arrival.forged:
         return arrival
     visit = params.get(VISIT, "")
     return Arrival(arrival.marketplace, visit if is_visit(visit) else None)
@@ -240,6 +241,8 @@ def known_key(db: DbSession, lab: Lab, visit: Visit) -> str | None:
 
 
 def kind_of(db: DbSession, lab: Lab, visit: Visit) -> EntryKind:
+    if visit.arrival.forged:
+        return "not_invited"
     if visit.row.status == "paused":
         return "paused"
     if visit.row.status == "closed":

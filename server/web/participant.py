@@ -3,6 +3,8 @@
 The server decides the state first and shows the page of that state, whatever was asked for.
 """
 
+from collections.abc import Collection
+
 from fastapi import APIRouter
 from starlette.responses import RedirectResponse, Response
 
@@ -10,6 +12,7 @@ from server.domain.errors import NotFoundError
 from server.recruitment import mturk
 from server.recruitment.recognition import exit_link
 from server.services import enrol, pages
+from server.services.lab import Lab
 from server.services.pages import Page as State
 from server.web import messages
 from server.web.dependencies import CurrentLab, Fields
@@ -27,7 +30,7 @@ def session_page(lab: CurrentLab, key: str) -> Response:
             state = pages.page_of(db, lab, enrol.participant_by_key(db, lab, key))
     except NotFoundError:
         return html(messages.unknown_session(), 404)
-    return page_of_state(state, key)
+    return page_of_state(lab, state, key)
 
 
 @router.post("/p/{key}/next")
@@ -42,15 +45,17 @@ def next_page(lab: CurrentLab, key: str, fields: Fields) -> Response:
     return RedirectResponse(f"/p/{key}", 303)
 
 
-def page_of_state(state: State, key: str) -> Response:
+def page_of_state(lab: Lab, state: State, key: str) -> Response:
     """The state as a page; MTurk's worker site may embed its own workers' pages."""
-    frames = mturk.FRAME_HOSTS if state.marketplace == "mturk" else ()
+    extra = lab.settings.mturk_extra_host
+    frames = mturk.frame_hosts(extra) if state.marketplace == "mturk" else ()
     if state.kind == "instructions":
         return html(instructions(state, key), frames=frames)
     if state.kind == "play":
         return html(play(state, key), frames=frames)
-    forms = mturk.SUBMIT_HOSTS if state.marketplace == "mturk" else ()
-    return html(complete(state), frames=frames, forms=forms)
+    hosts = mturk.submit_hosts(extra)
+    forms = hosts if state.marketplace == "mturk" else ()
+    return html(complete(state, hosts), frames=frames, forms=forms)
 
 
 def instructions(state: State, key: str) -> InstructionsPage:
@@ -99,9 +104,9 @@ def play(state: State, key: str) -> PlayPage:
     )
 
 
-def complete(state: State) -> CompletePage:
+def complete(state: State, submit_hosts: Collection[str]) -> CompletePage:
     code = state.completion_code or ""
-    link = exit_link(state.marketplace, code, state.parameters, state.study.completion_url)
+    link = exit_link(state.marketplace, code, state.parameters, state.study.completion_url, submit_hosts)
     return CompletePage(
         title=state.study.title,
         code=code,
