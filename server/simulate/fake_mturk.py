@@ -139,6 +139,12 @@ def inside(app: FastAPI, market: Market, door: Door) -> None:
         ]
         return {"balance": f"{market.balance:.2f}", "payments": lines, "messages": market.messages}
 
+    @app.post("/fake/reset")
+    async def reset() -> dict[str, str]:
+        market.clear()
+        door.throttle_next = 0
+        return {"now": market.now().isoformat()}
+
     @app.post("/fake/forward/{seconds}")
     async def forward(seconds: float) -> dict[str, str]:
         market.forward(seconds)

@@ -104,9 +104,13 @@ class Market:
     def __init__(
         self, seed: int = 0, delay_s: float = 0.0, clock: Callable[[], datetime] = lambda: datetime.now(UTC)
     ) -> None:
-        self._chance = random.Random(seed)  # noqa: S311 a fake, and it must be repeatable
-        self._clock, self._shift = clock, timedelta()
-        self.delay_s = delay_s
+        self.seed, self.delay_s, self._clock = seed, delay_s, clock
+        self.clear()
+
+    def clear(self) -> None:
+        """Begin again: nothing is posted, no time was skipped, and chance is as it was at first."""
+        self._chance = random.Random(self.seed)  # noqa: S311 a fake, and it must be repeatable
+        self._shift = timedelta()
         self.balance = BALANCE
         self.hit_types: dict[str, dict[str, Any]] = {}
         self.hits: dict[str, Hit] = {}

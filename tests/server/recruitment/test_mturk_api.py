@@ -22,17 +22,30 @@ from server.simulate.mturk_operations import OPERATIONS
 from tests.server.recruitment.mturk_site import POSTING, Site, mturk_site
 
 
-@pytest.fixture(name="site")
-def a_fake_that_answers() -> Iterator[Site]:
+@pytest.fixture(scope="module", name="running")
+def a_fake_that_answers() -> Iterator[tuple[Site, MTurkClient]]:
+    """One for all tests: a boto3 client takes as long to make as ten of them to run."""
     with mturk_site() as site:
-        yield site
+        client = site.client()
+        yield site, client
+        client.close()
+
+
+@pytest.fixture(name="site")
+def an_empty_marketplace(running: tuple[Site, MTurkClient]) -> Site:
+    assert httpx.post(f"{running[0].url}/fake/reset").status_code == 200
+    return running[0]
 
 
 @pytest.fixture(name="recruiter")
-def a_recruiter(site: Site) -> Iterator[MTurkRecruiter]:
-    made = site.recruiter()
-    yield made
-    made.close()
+def a_recruiter(site: Site, running: tuple[Site, MTurkClient]) -> MTurkRecruiter:
+    return site.recruiter(running[1])
+
+
+@pytest.fixture(name="forgetful")
+def another_recruiter(site: Site, running: tuple[Site, MTurkClient]) -> MTurkRecruiter:
+    """Of the same account, in another process: it remembers nothing."""
+    return site.recruiter(running[1])
 
 
 @pytest.fixture(name="open_posting")
@@ -62,21 +75,23 @@ def test_nobody_is_recruited_before_publishing(site: Site, recruiter: MTurkRecru
     assert list(recruiter.submissions(posted.id)) == []
 
 
-def test_creating_and_publishing_twice_makes_one_posting(site: Site, recruiter: MTurkRecruiter) -> None:
-    first, second = recruiter.create(POSTING), site.recruiter().create(POSTING)
+def test_creating_and_publishing_twice_makes_one_posting(
+    site: Site, recruiter: MTurkRecruiter, forgetful: MTurkRecruiter
+) -> None:
+    first, second = recruiter.create(POSTING), forgetful.create(POSTING)
     assert first == second
-    published = [site.recruiter().publish(first.id) for _ in range(3)]
+    published = [each.publish(first.id) for each in (recruiter, forgetful, recruiter)]
     assert {each.state for each in published} == {"active"}
     assert len(site.market.hits) == len(site.market.qualifications) == 1
 
 
 def test_a_hit_that_mturk_does_not_list_yet_is_not_made_twice(
-    site: Site, recruiter: MTurkRecruiter, open_posting: str, monkeypatch: pytest.MonkeyPatch
+    site: Site, forgetful: MTurkRecruiter, open_posting: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nothing: dict[str, Any] = {"HITs": [], "NumResults": 0}
     monkeypatch.setitem(OPERATIONS, "ListHITsForQualificationType", lambda *_: nothing)
     with pytest.raises(RecruiterError, match="does not list it yet") as caught:
-        site.recruiter().publish(open_posting)
+        forgetful.publish(open_posting)
     assert caught.value.again
     assert len(site.market.hits) == 1
 
@@ -243,12 +258,12 @@ def test_screening_out_pays_the_reward_because_mturk_has_nothing_less(
 
 @pytest.mark.parametrize("hours", [0, 23, 25, 24 * 90])
 def test_a_bonus_is_paid_once_however_late_it_is_sent_again(
-    site: Site, recruiter: MTurkRecruiter, open_posting: str, hours: int
+    site: Site, recruiter: MTurkRecruiter, forgetful: MTurkRecruiter, open_posting: str, hours: int
 ) -> None:
     submission = handed_in(site, recruiter, open_posting, "AADA")
     first = recruiter.pay_bonuses(open_posting, [bonus(submission, "AADA")])
     site.market.forward(hours * 3_600)
-    again = site.recruiter().pay_bonuses(open_posting, [bonus(submission, "AADA")])
+    again = forgetful.pay_bonuses(open_posting, [bonus(submission, "AADA")])
     assert [each.request for each in first] == [each.request for each in again] == ["b-1"]
     assert site.bonuses() == [("AADA", "1.25")]
     assert [each.bonus_minor for each in recruiter.submissions(open_posting)] == [125]
