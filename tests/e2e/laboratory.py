@@ -56,8 +56,8 @@ class Laboratory:
 
 
 @contextmanager
-def laboratory(folder: Path) -> Iterator[Laboratory]:
-    """A migrated database, two short studies, and a server that answers."""
+def laboratory(folder: Path, **settings: str) -> Iterator[Laboratory]:
+    """A migrated database, two short studies, and a server that answers; `settings` are its variables."""
     bundles = folder / "bundles"
     for name, (task, channel) in AGENTS.items():
         agent(bundles, task, name, channel)
@@ -68,6 +68,7 @@ def laboratory(folder: Path) -> Iterator[Laboratory]:
         "HATLAB_ADMIN_PASSWORD": "only for tests, never elsewhere",
         "HATLAB_PUBLIC_URL": f"http://127.0.0.1:{port}",
         "OMP_NUM_THREADS": "1",
+        **settings,
     }
     here = Laboratory(folder, environment["HATLAB_PUBLIC_URL"], environment)
     made = here.hatlab("init")
