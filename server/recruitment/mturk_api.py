@@ -18,6 +18,7 @@ from typing import Any
 from server.recruitment import mturk_draft as drafts
 from server.recruitment import mturk_xml as xml
 from server.recruitment.arrival import Marketplace
+from server.recruitment.bonuses import by_request
 from server.recruitment.mturk_client import MTurkClient, RefusedError
 from server.recruitment.mturk_draft import Draft
 from server.recruitment.mturk_hit import (
@@ -179,15 +180,18 @@ class MTurkRecruiter:
         is listed under it is not paid again. Should MTurk fail between two payments, the same call pays the
         rest.
         """
+        wanted = by_request(bonuses)
         hit = self._hit(posting_id)
         if hit is None:
             raise RecruiterError("nobody has taken part yet: the HIT is not published")
         paid = self._paid(hit["HITId"])
-        due = {bonus.request: bonus for bonus in bonuses if bonus.request not in paid}
-        self._check(hit["HITId"], tuple(due.values()))
-        for bonus in due.values():
+        for request in wanted.keys() & paid.keys():
+            refuse_changed(wanted[request], paid[request])
+        due = [bonus for request, bonus in wanted.items() if request not in paid]
+        self._check(hit["HITId"], due)
+        for bonus in due:
             self._send(hit["HITId"], bonus)
-        return [Paid(bonus.request, bonus.request) for bonus in bonuses]
+        return [Paid(request, request) for request in wanted]
 
     def paid_bonuses(self, posting_id: str) -> Mapping[str, Sequence[int]]:
         """Amounts of the bonuses that each assignment was paid."""
@@ -285,18 +289,20 @@ class MTurkRecruiter:
             return None
         return str(found["Assignment"]["AssignmentStatus"])
 
-    def _paid(self, hit_id: str) -> set[str]:
-        """Names of the payments that MTurk lists."""
+    def _paid(self, hit_id: str) -> dict[str, tuple[str, int]]:
+        """Assignment and amount of the payments that MTurk lists, by name."""
         listed = self._client.every("list_bonus_payments", "BonusPayments", HITId=hit_id)
-        return {found[1] for each in listed if (found := MARK.search(each["Reason"]))}
+        return {
+            found[1]: (each["AssignmentId"], minor(each["BonusAmount"]))
+            for each in listed
+            if (found := MARK.search(each["Reason"]))
+        }
 
     def _check(self, hit_id: str, bonuses: Sequence[Bonus]) -> None:
         if not bonuses:
             return
         workers = {each["AssignmentId"]: each["WorkerId"] for each in self._assignments(hit_id)}
         for bonus in bonuses:
-            if bonus.amount_minor <= 0:
-                raise RecruiterError(f"a bonus of {bonus.amount_minor} cents cannot be paid: {bonus.request}")
             if bonus.submission_id not in workers:
                 raise RecruiterError(NOT_YET.format(id=bonus.submission_id), again=True)
             if workers[bonus.submission_id] != bonus.external_id:
@@ -322,6 +328,16 @@ class MTurkRecruiter:
         except RefusedError as error:
             if error.again or (DONE_BEFORE not in str(error) and bonus.request not in self._paid(hit_id)):
                 raise
+
+
+def refuse_changed(bonus: Bonus, paid: tuple[str, int]) -> None:
+    """A name that was paid before, with another amount or to somebody else.
+
+    Raises:
+        RecruiterError: taking it as paid would lose this bonus.
+    """
+    if paid != (bonus.submission_id, bonus.amount_minor):
+        raise RecruiterError(f"bonus {bonus.request} was paid with other contents: give it another name")
 
 
 def parts(posting_id: str) -> tuple[str, str]:

@@ -22,6 +22,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from urllib.parse import quote
 
+from server.recruitment.bonuses import by_request
 from server.recruitment.prolific_http import Connection, LostError
 from server.recruitment.prolific_lookup import sitting, sittings
 from server.recruitment.prolific_wire import Bulk, decimal, read
@@ -151,14 +152,3 @@ class Bonuses:
 def place(bonus: Bonus) -> tuple[str, int]:
     """All that Prolific keeps of a bonus."""
     return bonus.submission_id, bonus.amount_minor
-
-
-def by_request(bonuses: Sequence[Bonus]) -> dict[str, Bonus]:
-    """Each request once. Two bonuses under one name, or an amount that is none, are refused."""
-    wanted: dict[str, Bonus] = {}
-    for bonus in bonuses:
-        if bonus.amount_minor <= 0:
-            raise RecruiterError(f"bonus {bonus.request} is {bonus.amount_minor}: an amount is above zero")
-        if wanted.setdefault(bonus.request, bonus) != bonus:
-            raise RecruiterError(f"two different bonuses are called {bonus.request}")
-    return wanted

@@ -71,9 +71,10 @@ class Marketplace:
     recruiter: Recruiter
     people: People
     can: frozenset[str] = EVERYTHING
+    posting: Posting = POSTING
 
     def open_study(self, **changes: object) -> Posted:
-        return self.recruiter.publish(self.recruiter.create(replace(POSTING, **changes)).id)  # type: ignore[arg-type]
+        return self.recruiter.publish(self.recruiter.create(replace(self.posting, **changes)).id)  # type: ignore[arg-type]
 
     def finished(self, posting_id: str) -> Taken:
         """Somebody who took part and was approved."""
@@ -100,21 +101,21 @@ class RecruiterContract:
     # Studies
 
     def test_a_draft_recruits_nobody(self, marketplace: Marketplace) -> None:
-        draft = marketplace.recruiter.create(POSTING)
+        draft = marketplace.recruiter.create(marketplace.posting)
         assert draft.state == "draft"
         assert marketplace.recruiter.posted(draft.id) == draft
         with pytest.raises(NoPlaceError):
             marketplace.people.take(draft.id)
 
     def test_the_same_draft_made_twice_is_one(self, marketplace: Marketplace) -> None:
-        first = marketplace.recruiter.create(POSTING)
-        assert marketplace.recruiter.create(POSTING).id == first.id
-        assert marketplace.recruiter.create(replace(POSTING, reward_minor=301)).id != first.id
+        first = marketplace.recruiter.create(marketplace.posting)
+        assert marketplace.recruiter.create(marketplace.posting).id == first.id
+        assert marketplace.recruiter.create(replace(marketplace.posting, reward_minor=301)).id != first.id
 
     def test_publishing_lets_people_in_and_twice_is_once(self, marketplace: Marketplace) -> None:
         posted = marketplace.open_study()
         assert posted.state == "active"
-        assert posted.places == POSTING.places
+        assert posted.places == marketplace.posting.places
         assert marketplace.recruiter.publish(posted.id) == posted
         assert marketplace.people.take(posted.id).submission_id
 
@@ -122,7 +123,7 @@ class RecruiterContract:
         taken = marketplace.people.take(marketplace.open_study().id)
         link = urlsplit(taken.entry_url)
         arrival = recognise(dict(parse_qsl(link.query)))
-        assert f"{link.scheme}://{link.netloc}{link.path}" == POSTING.entry_url
+        assert f"{link.scheme}://{link.netloc}{link.path}" == marketplace.posting.entry_url
         assert arrival.marketplace == marketplace.recruiter.marketplace
         assert (arrival.external_id, arrival.submission_id) == (taken.external_id, taken.submission_id)
         assert not arrival.preview

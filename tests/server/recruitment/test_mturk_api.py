@@ -279,6 +279,24 @@ def test_two_payments_of_one_person_are_two(site: Site, recruiter: MTurkRecruite
     assert [each.bonus_minor for each in recruiter.submissions(open_posting)] == [130]
 
 
+@pytest.mark.parametrize("changed", [{"cents": 126}, {"person": "ABOB"}])
+def test_a_name_that_was_paid_is_not_taken_for_another_bonus(
+    site: Site,
+    recruiter: MTurkRecruiter,
+    forgetful: MTurkRecruiter,
+    open_posting: str,
+    changed: dict[str, Any],
+) -> None:
+    submissions = {person: handed_in(site, recruiter, open_posting, person) for person in ("AADA", "ABOB")}
+    recruiter.pay_bonuses(open_posting, [bonus(submissions["AADA"], "AADA")])
+    person = changed.get("person", "AADA")
+    other = bonus(**{"submission": submissions[person], "person": person, **changed})
+    fresh = bonus(submissions["ABOB"], "ABOB", request="b-2")
+    with pytest.raises(RecruiterError, match="other contents"):
+        forgetful.pay_bonuses(open_posting, [fresh, other])
+    assert site.bonuses() == [("AADA", "1.25")]
+
+
 def test_a_payment_whose_answer_was_lost_is_taken_as_made(
     site: Site, recruiter: MTurkRecruiter, open_posting: str
 ) -> None:
@@ -293,7 +311,7 @@ def test_a_payment_whose_answer_was_lost_is_taken_as_made(
 @pytest.mark.parametrize(
     ("wrong", "said"),
     [
-        ({"cents": 0, "request": "b-2"}, "0 cents"),
+        ({"cents": 0, "request": "b-2"}, "b-2 is 0"),
         ({"person": "ABOB", "request": "b-2"}, "somebody else's"),
         ({"submission": "3NEVER", "request": "b-2"}, "handed in"),
         ({"cents": 900_000, "request": "b-2"}, r"\$10801\.50, and the account has \$10000\.00"),
