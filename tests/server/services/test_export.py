@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from benchmarks import synthetic
+from benchmarks.rounds_only import ROUNDS_ONLY
 from server.domain import canonical
 from server.domain.errors import BadInputError, NotFoundError
 from server.domain.study import read
@@ -32,7 +33,7 @@ def prepared(database: Database) -> Lab:
     settings = Settings(database_url=database.url.render_as_string(hide_password=False))
     lab = Lab(settings, database, {}, (), "s" * 40, now=lambda: NOW)
     for name, slug in (("parent-child", "signs"), ("traffic-junction", "cars")):
-        values = {**studies.template(name), "slug": slug, "trials_per_block": 3}
+        values = {**studies.template(name), **ROUNDS_ONLY, "slug": slug, "trials_per_block": 3}
         launch(lab, read(values))
     return lab
 
