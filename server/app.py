@@ -15,7 +15,7 @@ from fastapi.telemetry import TelemetryConfig
 
 from server.services.lab import Lab
 from server.settings import Settings
-from server.web import admin, entry, errors, health, participant, play_api
+from server.web import admin, entry, errors, health, hooks, participant, play_api
 from server.web.security import BodyLimit, SecurityHeaders
 from server.web.static import VersionedFiles
 
@@ -46,7 +46,14 @@ def create_app(lab: Lab) -> FastAPI:
     )
     app.state.lab = lab
     errors.install(app)
-    for router in (play_api.router, entry.router, participant.router, health.router, admin.router):
+    for router in (
+        play_api.router,
+        entry.router,
+        participant.router,
+        health.router,
+        hooks.router,
+        admin.router,
+    ):
         app.include_router(router)
     app.mount("/static", VersionedFiles())
     return app

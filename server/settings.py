@@ -41,6 +41,9 @@ class Settings(BaseSettings):
     """API token of the Prolific account that studies are published from. Unset: recruiting there is off."""
     prolific_api: str = "https://api.prolific.com/api/v1"
     """Root of Prolific's API; `hatlab fake-prolific` prints the one of a marketplace to try things with."""
+    prolific_settle_s: float = Field(default=3_600, ge=0)
+    """How long after a bonus Prolific's own list shows it for certain; one whose answer was lost waits so
+    long before anybody looks and pays again."""
     prolific_webhook_secret: SecretStr | None = None
     """Secret that Prolific signs its messages with. Unset: no message is believed, changes are asked for."""
 

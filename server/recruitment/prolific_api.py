@@ -7,7 +7,7 @@ import httpx
 from pydantic import SecretStr
 
 from server.recruitment.arrival import Marketplace
-from server.recruitment.prolific_bonuses import Bonuses
+from server.recruitment.prolific_bonuses import SETTLED_S, Bonuses
 from server.recruitment.prolific_http import Connection, LostError, RefusedError
 from server.recruitment.prolific_lookup import (
     draft_named,
@@ -57,11 +57,13 @@ class ProlificRecruiter:
         approve_automatically: bool = False,
         screen_out_minor: int | None = None,
         project: str | None = None,
+        settle_s: float = SETTLED_S,
     ) -> None:
         self._connection = connection
         self._approve_automatically = approve_automatically
         self._screen_out_minor = screen_out_minor
         self._project = project
+        self.settle_s = settle_s
         self._bonuses = Bonuses(connection)
 
     @classmethod

@@ -110,6 +110,8 @@ class Recruiter(Protocol):
     """One marketplace. Every method may raise RecruiterError; all are safe to repeat."""
 
     marketplace: Marketplace
+    settle_s: float
+    """How long after a bonus was asked for `paid_bonuses` tells for certain whether it was paid."""
 
     def create(self, posting: Posting) -> Posted:
         """Make a draft (or what comes nearest: nobody is recruited before `publish`)."""
@@ -149,6 +151,10 @@ class Recruiter(Protocol):
 
     def pay_bonuses(self, posting_id: str, bonuses: Sequence[Bonus]) -> Sequence[Paid]:
         """Pay every one of them, or raise before anything was paid; UncertainError: nobody knows which."""
+        ...
+
+    def paid_bonuses(self, posting_id: str) -> Mapping[str, Sequence[int]]:
+        """Amounts of the bonuses that each submission was paid so far."""
         ...
 
 

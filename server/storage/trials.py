@@ -1,12 +1,12 @@
 """Rows of trials. What stands after `seed` is computed from the events and kept for quick reading."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from sqlalchemy import bindparam, insert, select, update
+from sqlalchemy import bindparam, func, insert, select, update
 
 from server.storage.database import DbSession
-from server.storage.tables import trial
+from server.storage.tables import participant, trial
 
 
 class TrialRow(NamedTuple):
@@ -76,3 +76,18 @@ def moved_on(db: DbSession, row: TrialRow) -> None:
     """Write what the last event changed."""
     new = {f"new_{name}": getattr(row, name) for name in PROGRESS}
     db.write(MOVED_ON, {"trial_id": row.id, **new})
+
+
+def won(db: DbSession, study_id: int, outcomes: Collection[str]) -> dict[str, int]:
+    """How many main rounds each participant of a study has won."""
+    statement = (
+        select(trial.c.participant_id, func.count())
+        .join(participant, participant.c.id == trial.c.participant_id)
+        .where(participant.c.study_id == study_id, trial.c.phase == "main", trial.c.outcome.in_(outcomes))
+        .group_by(trial.c.participant_id)
+    )
+    found: dict[str, int] = {}
+    for row in db.read(statement):
+        who, number = list(row)
+        found[who] = int(number)
+    return found

@@ -9,7 +9,7 @@ from starlette.responses import Response
 from server.services import accounts
 from server.services.accounts import SignedIn, Wait
 from server.services.lab import Lab
-from server.web import admin_agents, admin_build, admin_launch, admin_list, admin_monitor
+from server.web import admin_agents, admin_build, admin_launch, admin_list, admin_monitor, admin_recruit
 from server.web.admin_access import (
     HOME,
     LOGIN_COOKIE,
@@ -88,5 +88,5 @@ def logout(lab: CurrentLab, visitor: CurrentVisitor, _: CheckedForm) -> Response
     return response
 
 
-for part in (admin_list, admin_build, admin_launch, admin_monitor, admin_agents):
+for part in (admin_list, admin_build, admin_launch, admin_monitor, admin_recruit, admin_agents):
     router.include_router(part.router)

@@ -254,3 +254,75 @@ class NoticePage:
     paragraphs: tuple[str, ...]
     back_url: str
     back_label: str
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A marketplace that can be recruited at; without an account the page says how to connect one."""
+
+    name: str
+    label: str
+    connected: bool
+
+
+@dataclass(frozen=True, slots=True)
+class MismatchLine:
+    key: str
+    participant: str
+    submission: str
+    ours: str
+    theirs: str
+    says: str
+    action: str
+    amount: str
+    can_do: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LedgerLine:
+    when: str
+    participant: str
+    submission: str
+    what: str
+    amount: str
+    state: str
+    by: str
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class PostingBox:
+    """One posting at a marketplace with everything about it."""
+
+    id: int
+    marketplace: str
+    external_id: str
+    state: str
+    mode: str
+    places: int
+    polled: str
+    states: tuple[tuple[str, int], ...]
+    mismatches: tuple[MismatchLine, ...]
+    to_do: int
+    ledger: tuple[LedgerLine, ...]
+    ledger_more: int
+    spent: str
+
+
+@dataclass(frozen=True, slots=True)
+class RecruitmentPage:
+    """Postings of a study and the reconciler; `outcomes` are (done, key, words) of the last confirmation."""
+
+    template: ClassVar[str] = "admin/recruitment.html"
+    frame: Frame
+    head: StudyHead
+    choices: tuple[Choice, ...]
+    postings: tuple[PostingBox, ...]
+    can_post: bool
+    places: int
+    values: Mapping[str, str]
+    error: str
+    outcomes: tuple[tuple[bool, str, str], ...]
+    caps: tuple[str, str]
+    """Of one participant, and of the study."""
+    webhook_url: str

@@ -1,0 +1,299 @@
+"""Recruiting at the made-up Prolific: what is told moves people, and money is paid once."""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from pydantic import SecretStr
+
+from server.domain.errors import BadInputError, NotReadyError
+from server.recruitment.recruiter import Change, Submission
+from server.services import enrol, leave, reconcile, recruit
+from server.services.lab import Lab
+from server.services.reconcile import Outcome
+from server.services.session import session_of
+from server.services.verify import verify
+from server.simulate.fake_prolific import FakeProlific, running
+from server.simulate.fake_prolific_market import Market
+from server.simulate.fake_prolific_weather import Weather
+from server.storage import journeys, postings
+from server.storage.database import Database
+from tests.fakes import FakeClock, definition, fake_lab
+from tests.server.recruitment.contract import Taken
+from tests.server.recruitment.prolific_people import FakePeople
+from tests.server.services.steps import DESKTOP, launch, person, play_all
+
+TOKEN = "t0k3n-of-the-tests"
+SLUG = "traffic-junction"
+PAY = {
+    "currency": "GBP",
+    "reward_minor": 300,
+    "partial_minor": 50,
+    "screen_out_minor": 20,
+    "bonus_success_minor": 10,
+    "bonus_max_minor": 10,
+    "cap_participant_minor": 400,
+    "cap_study_minor": 2_000,
+}
+CODES = {"screened_out": "SCREENED", "failed": "", "withdrawn": "LEFT-EARLY"}
+
+
+@dataclass
+class Site:
+    """A study at the fake marketplace, and the people there."""
+
+    lab: Lab
+    people: FakePeople
+    posting_id: int
+
+    @property
+    def external_id(self) -> str:
+        return recruit.opened(self.lab, self.posting_id).row.external_id
+
+    def arrive(self) -> tuple[Taken, str]:
+        """Somebody takes a place there and consents here; the key of the session."""
+        taken = self.people.take(self.external_id)
+        params = dict(pair.split("=") for pair in taken.entry_url.partition("?")[2].split("&"))
+        with self.lab.database.writing() as db:
+            result = enrol.consent(db, self.lab, SLUG, params, agree=True, device=DESKTOP)
+        assert isinstance(result, enrol.Enrolled)
+        return taken, result.key
+
+    def finish(self) -> tuple[Taken, str]:
+        taken, key = self.arrive()
+        play_all(self.lab, key)
+        self.people.hand_in(taken, person(self.lab, key).completion_code or "")
+        return taken, key
+
+    def found(self) -> reconcile.Found:
+        recruit.poll(self.lab, self.posting_id)
+        with self.lab.database.reading() as db:
+            return reconcile.look(db, self.lab, self.posting_id)
+
+    def proposed(self) -> list[tuple[str, int]]:
+        return [(each.action, each.amount_minor) for each in self.found().mismatches]
+
+    def confirm_all(self, action: str = "") -> list[Outcome]:
+        keys = [key for key in reconcile.confirmable(self.found()) if key.startswith(action)]
+        return reconcile.confirm(self.lab, self.posting_id, keys, "ada")
+
+
+def site_at(url: str, people: FakePeople, database: Database, **changes: Any) -> Site:
+    """A fresh study, published with three places."""
+    lab = fake_lab(database)
+    settings = lab.settings.model_copy(
+        update={"prolific_api": f"{url}/api/v1", "prolific_token": SecretStr(TOKEN)}
+    )
+    lab = replace(lab, settings=settings)
+    launch(lab, definition(SLUG, **{"trials_per_block": 1, "pay": PAY, "codes": CODES} | changes))
+    name = hashlib.sha256(str(database.url).encode()).hexdigest()[:8]
+    posting_id = recruit.create(lab, SLUG, "prolific", 3, f"Drive a car. {name}")
+    recruit.publish(lab, posting_id)
+    return Site(lab, people, posting_id)
+
+
+@pytest.fixture
+def url() -> Iterator[str]:
+    with running(FakeProlific(TOKEN, Market(1), Weather(1))) as served:
+        yield served
+
+
+@pytest.fixture
+def people(url: str) -> Iterator[FakePeople]:
+    made = FakePeople(url)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def site(url: str, people: FakePeople, database: Database) -> Site:
+    return site_at(url, people, database)
+
+
+def won(site: Site, key: str) -> int:
+    from server.services import pages
+
+    with site.lab.database.reading() as db:
+        return pages.page_of(db, site.lab, person(site.lab, key)).progress.bonus_minor
+
+
+def test_who_finished_is_paid_exactly_once_however_often_it_is_confirmed(site: Site) -> None:
+    taken, key = site.finish()
+    bonus = won(site, key)
+    expected = [("approve", 300)] + ([("bonus", bonus)] if bonus else [])
+    assert site.proposed() == expected
+    first = site.confirm_all()
+    assert all(each.done for each in first), first
+    assert site.people.rewards(taken) == 1
+    assert list(site.people.bonuses(taken)) == ([bonus] if bonus else [])
+    again = reconcile.confirm(site.lab, site.posting_id, [each.key for each in first], "bob")
+    assert all(each.done for each in again)
+    assert site.people.rewards(taken) == 1
+    assert site.proposed() == []
+    assert verify(site.lab).clean
+
+
+def test_both_sides_agree_before_anybody_hands_in(site: Site) -> None:
+    site.arrive()
+    assert site.proposed() == []
+
+
+def test_who_returns_the_place_there_leaves_here_and_may_come_back(site: Site) -> None:
+    taken, key = site.arrive()
+    site.people.give_back(taken)
+    site.found()
+    assert person(site.lab, key).status == "returned"
+    params = {"PROLIFIC_PID": taken.external_id, "STUDY_ID": "s", "SESSION_ID": "another"}
+    with site.lab.database.writing() as db:
+        enrol.come_back(db, site.lab, key, params)
+    assert person(site.lab, key).status == "active"
+    with site.lab.database.reading() as db:
+        told = journeys.of_participant(db, person(site.lab, key).id)
+    assert [(row.event, row.source) for row in told[1:]] == [
+        ("return_told", "prolific"),
+        ("took_again", "prolific"),
+    ]
+    assert verify(site.lab).clean
+
+
+def test_who_hands_in_without_finishing_is_asked_to_return_and_never_rejected(site: Site) -> None:
+    taken, _ = site.arrive()
+    site.people.hand_in(taken, "GUESSED")
+    assert site.proposed() == [("ask_return", 0)]
+    assert all(each.done for each in site.confirm_all())
+    assert site.people.rewards(taken) == 0
+    assert site.found().mismatches == ()
+
+
+def test_another_code_than_was_shown_is_looked_into_by_a_person(site: Site) -> None:
+    taken, key = site.arrive()
+    play_all(site.lab, key)
+    site.people.hand_in(taken, "OTHER")
+    assert site.proposed() == [("look", 0)]
+    (mismatch,) = site.found().mismatches
+    (outcome,) = reconcile.confirm(site.lab, site.posting_id, [mismatch.key], "ada")
+    assert not outcome.done
+    assert site.people.rewards(taken) == 0
+
+
+def test_who_withdraws_gets_the_partial_pay_and_is_asked_to_return(site: Site) -> None:
+    taken, key = site.arrive()
+    with site.lab.database.writing() as db:
+        leave.withdraw(db, site.lab, enrol.participant_by_key(db, site.lab, key), keep=False)
+    site.people.hand_in(taken, "LEFT-EARLY")
+    assert site.proposed() == [("partial", 50), ("ask_return", 0)]
+    assert all(each.done for each in site.confirm_all())
+    assert list(site.people.bonuses(taken)) == [50]
+    assert verify(site.lab).clean
+
+
+def test_a_lost_answer_about_money_is_not_sent_again_before_it_can_be_told(
+    url: str, people: FakePeople, sqlite_database: Database
+) -> None:
+    clock = FakeClock()
+    site = site_at(url, people, sqlite_database)
+    site.lab = replace(site.lab, now=clock)
+    taken, key = site.arrive()
+    with site.lab.database.writing() as db:
+        leave.withdraw(db, site.lab, enrol.participant_by_key(db, site.lab, key), keep=True)
+    people.plan_fault(match="/pay", status=500, when="after")
+    (outcome,) = site.confirm_all("partial")
+    assert not outcome.done
+    assert [row.state for row in site.found().ledger] == ["sent"]
+    (early,) = site.confirm_all("partial")
+    assert not early.done
+    assert "too" in early.says or "later" in early.says
+    assert list(people.bonuses(taken)) == [50]
+    clock.now += timedelta(hours=2)
+    (late,) = site.confirm_all("partial")
+    assert late.done, late
+    assert list(people.bonuses(taken)) == [50]
+    assert [row.state for row in site.found().ledger] == ["done"]
+
+
+def test_a_worker_that_died_while_paying_pays_once(site: Site, monkeypatch: pytest.MonkeyPatch) -> None:
+    taken, _ = site.finish()
+    (key, *_) = reconcile.confirmable(site.found())
+
+    def die(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(reconcile, "end", die)
+        with pytest.raises(KeyboardInterrupt):
+            reconcile.confirm(site.lab, site.posting_id, [key], "ada")
+    assert site.people.rewards(taken) == 1
+    site.found()
+    site.confirm_all()
+    assert site.people.rewards(taken) == 1
+    assert site.proposed() == []
+
+
+def test_nothing_is_paid_beyond_the_caps(url: str, people: FakePeople, sqlite_database: Database) -> None:
+    tight = {**PAY, "bonus_success_minor": 0, "bonus_max_minor": 0}
+    tight |= {"cap_participant_minor": 300, "cap_study_minor": 300}
+    site = site_at(url, people, sqlite_database, pay=tight)
+    one, other = site.finish()[0], site.finish()[0]
+    outcomes = site.confirm_all()
+    assert sorted(each.done for each in outcomes) == [False, True]
+    assert "cap for the study" in next(each.says for each in outcomes if not each.done)
+    assert people.rewards(one) + people.rewards(other) == 1
+
+
+def test_a_webhook_is_taken_once_and_an_old_one_does_not_bring_anybody_back(site: Site) -> None:
+    taken, key = site.arrive()
+
+    def told(event_id: str, state: Any) -> bool:
+        said = Submission(taken.submission_id, taken.external_id, state)
+        return recruit.take_change(site.lab, "prolific", Change(event_id, "", said))
+
+    assert told("e1", "returned")
+    assert not told("e1", "returned")
+    assert person(site.lab, key).status == "returned"
+    assert told("e0", "active")
+    with site.lab.database.reading() as db:
+        assert [row.state for row in postings.submissions(db, site.posting_id)] == ["returned"]
+
+
+def test_a_webhook_about_nobody_here_is_left_alone(site: Site) -> None:
+    said = Submission("elsewhere", "nobody", "active")
+    assert not recruit.take_change(site.lab, "prolific", Change("e", "", said))
+
+
+def test_places_are_added_and_never_taken_away(site: Site) -> None:
+    recruit.set_places(site.lab, site.posting_id, 5)
+    assert recruit.opened(site.lab, site.posting_id).row.places == 5
+    with pytest.raises(BadInputError, match="from 5 to"):
+        recruit.set_places(site.lab, site.posting_id, 2)
+    recruit.pause(site.lab, site.posting_id)
+    assert recruit.opened(site.lab, site.posting_id).row.state == "paused"
+
+
+def test_without_an_account_the_refusal_says_what_to_do(sqlite_database: Database) -> None:
+    lab = fake_lab(sqlite_database)
+    launch(lab, definition(SLUG, pay=PAY))
+    with pytest.raises(NotReadyError, match=r"docs/settings\.md"):
+        recruit.create(lab, SLUG, "prolific", 3, "")
+
+
+def test_a_study_without_pay_is_not_offered(sqlite_database: Database) -> None:
+    lab = fake_lab(sqlite_database)
+    launch(lab, definition(SLUG))
+    with pytest.raises(BadInputError, match="states no pay"):
+        recruit.create(lab, SLUG, "prolific", 3, "")
+
+
+def test_robots_and_tests_are_never_reconciled_with_people(site: Site) -> None:
+    taken, key = site.finish()
+    from sqlalchemy import update
+
+    from server.storage.tables import participant
+
+    with site.lab.database.writing() as db:
+        db.write(update(participant).values(mode="robot"))
+        assert session_of(db, site.lab, enrol.participant_by_key(db, site.lab, key))
+    assert site.proposed() == [("ask_return", 0)]
+    assert site.people.rewards(taken) == 0
