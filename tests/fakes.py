@@ -147,7 +147,7 @@ def with_checks_in_reach(values: dict[str, Any]) -> dict[str, Any]:
     rounds = values["trials_per_block"] * (2 if values["task"] == "parent_child" else 1)
     checks = values["attention"]
     gaps = len(checks) + 1
-    spread = [check | {"after": rounds * number // gaps} for number, check in enumerate(checks, start=1)]
+    spread = [check | {"after": -(-rounds * number // gaps)} for number, check in enumerate(checks, start=1)]
     return values | {"attention": spread}
 
 

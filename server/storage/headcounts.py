@@ -21,6 +21,15 @@ class Tally(NamedTuple):
     last_seen_utc: str
 
 
+class Stand(NamedTuple):
+    """People of one version who agree in mode, arm and standing."""
+
+    mode: str
+    arm: str
+    standing: str
+    people: int
+
+
 class Person(NamedTuple):
     id: str
     version: int
@@ -56,6 +65,18 @@ def tallies(db: DbSession, study_id: int, seen_since_utc: str) -> list[Tally]:
         .group_by(*cell)
     )
     return [Tally._make(row) for row in db.read(statement)]
+
+
+def stands(db: DbSession, study_version_id: int, seen_since_utc: str) -> list[Stand]:
+    """Everybody of one version, whose lease began then."""
+    cell = (participant.c.mode, participant.c.arm, standing(seen_since_utc))
+    statement = (
+        select(*cell, func.count())
+        .where(participant.c.study_version_id == study_version_id)
+        .group_by(*cell)
+        .order_by(*cell)
+    )
+    return [Stand._make(row) for row in db.read(statement)]
 
 
 def people(

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from server.domain.money import shown
+from server.domain.money import reward_minor, shown
 from server.domain.participation import State as Standing
 from server.domain.study import StudyDefinition
 from server.recruitment.arrival import Arrival, ExitLink
@@ -141,15 +141,9 @@ def paid_of(state: State) -> tuple[tuple[str, str], ...]:
     pay = state.study.pay
     if pay is None:
         return ()
-    amounts = {
-        Standing.FINISHED: pay.reward_minor,
-        Standing.FAILED: pay.reward_minor,
-        Standing.WITHDRAWN: pay.partial_minor,
-        Standing.SCREENED_OUT: pay.screen_out_minor,
-    }
     lines = []
-    if amounts.get(state.state):
-        lines.append(("For your time", shown(amounts[state.state], pay.currency)))
+    if reward := reward_minor(pay, state.state):
+        lines.append(("For your time", shown(reward, pay.currency)))
     if state.state in {Standing.FINISHED, Standing.FAILED} and pay.bonus_success_minor:
         won = f"Bonus for {state.progress.won} of {state.progress.rounds} rounds"
         lines.append((won, shown(state.progress.bonus_minor, pay.currency)))
