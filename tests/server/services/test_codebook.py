@@ -21,8 +21,8 @@ NAMED_IN_THE_ISSUE = {
     "consented_utc finished_utc status completion_code attention_failed excluded exclusion_reason won "
     "bonus_minor currency reward_minor erased",
     "agents": "trial_id seq step seat action token gate cell source",
-    "answers": "study study_version mode participant arm form block attempt item value label correct first_ms "
-    "last_ms changes answered_utc",
+    "answers": "study study_version mode participant arm form block attempt item value label correct "
+    "first_ms last_ms changes answered_utc",
     "probe": "participant arm communication sign position token row column probability best distance least",
     "browser_events": "participant visit seq page kind value at_ms stored_utc",
     "journey": "participant seq event state source stored_utc",
