@@ -9,7 +9,7 @@ from server.storage.tables import participant, study_version, trial
 
 
 class Tally(NamedTuple):
-    """People who agree in all of this; `standing`: finished, active, away (not seen since), abandoned."""
+    """People who agree in all of this; `standing`: the stored status, or `away` (active, not seen since)."""
 
     version: int
     mode: str
