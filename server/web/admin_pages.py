@@ -163,6 +163,7 @@ class BuildPage:
     arms: tuple[int, ...]
     bundles: tuple[BundleChoice, ...]
     communications: tuple[tuple[str, str], ...]
+    roles: tuple[str, ...]
     mistakes: tuple[Mistake, ...]
     wrong_sections: frozenset[str]
     base: str
