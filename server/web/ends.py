@@ -1,5 +1,6 @@
 """What is told at each end that somebody in a study can come to: where they stand, and what to do next."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from server.domain.money import reward_minor, shown
@@ -17,6 +18,15 @@ class Told(NamedTuple):
     paragraphs: tuple[str, ...]
 
 
+HEADINGS: Mapping[Standing, str] = {
+    Standing.FINISHED: "Thank you, you are finished",
+    Standing.FAILED: "Thank you, you are finished",
+    Standing.WITHDRAWN: "You have left the study",
+    Standing.SCREENED_OUT: "The study ends here for you",
+    Standing.TIMED_OUT: "Your time for this study is over",
+    Standing.RETURNED: "You have returned your place",
+    Standing.REJECTED: "This session is closed",
+}
 KEPT = "What you did so far is kept, as you allowed."
 ERASED = (
     "What you did in the study has been deleted. The identifier that pays you is kept until you are paid."
@@ -69,18 +79,19 @@ def link_of(state: State, code: str) -> ExitLink | None:
 def told_of(state: State) -> Told:
     """The words of an end; whoever failed attention checks is thanked like everybody."""
     study, standing = state.study, state.state
+    heading = HEADINGS[standing]
     contact = CONTACT.format(contact=study.contact)
     pay = WITH_CODE if state.code else BACK
     if standing in {Standing.FINISHED, Standing.FAILED}:
-        return Told("good", "Thank you, you are finished", (study.texts.complete,))
+        return Told("good", heading, (study.texts.complete,))
     if standing is Standing.WITHDRAWN:
-        return Told("info", "You have left the study", (KEPT if state.data_kept else ERASED, pay))
+        return Told("info", heading, (KEPT if state.data_kept else ERASED, pay))
     if standing is Standing.SCREENED_OUT:
-        return Told("info", "The study ends here for you", screened_out(state.code or "", contact))
+        return Told("info", heading, screened_out(state.code or "", contact))
     others: dict[Standing, Told] = {
         Standing.TIMED_OUT: Told(
             "wait",
-            "Your time for this study is over",
+            heading,
             (
                 "You were away for a while, and your place has been given to somebody else.",
                 "Your site may let you take a new place: then its link brings you back to where you were.",
@@ -89,7 +100,7 @@ def told_of(state: State) -> Told:
         ),
         Standing.RETURNED: Told(
             "info",
-            "You have returned your place",
+            heading,
             (
                 "Nothing more is expected of you.",
                 "If you take a place again on the site that sent you, its link brings you back here.",
@@ -97,7 +108,7 @@ def told_of(state: State) -> Told:
         ),
         Standing.REJECTED: Told(
             "stop",
-            "This session is closed",
+            heading,
             ("The site that sent you has closed your submission.", contact),
         ),
     }
