@@ -70,6 +70,8 @@ class Served:
     bundles: Path | None = None
     port: int = field(default_factory=free_port)
     process: subprocess.Popen[bytes] | None = None
+    extra: dict[str, str] = field(default_factory=dict)
+    """More settings of the server, by variable."""
 
     @property
     def url(self) -> str:
@@ -84,6 +86,7 @@ class Served:
             "HATLAB_ADMIN_PASSWORD": "measurements only",
             "HATLAB_PUBLIC_URL": self.url,
             **({"HATLAB_BUNDLES": str(self.bundles)} if self.bundles else {}),
+            **self.extra,
         }
 
     def sign(self, slug: str) -> str:
@@ -112,7 +115,7 @@ class Served:
         yield opened
         opened.database.close()
 
-    def add_study(self, template: str, *, places: int, **changes: Any) -> str:
+    def add_study(self, template: str, *, places: int, mode: str = "test", **changes: Any) -> str:
         """Launch a study made from a template, with room for many; give its slug."""
         slug = f"{template}-measured"
         values = {**studies.template(template), **ROUNDS_ONLY, "slug": slug, **changes}
@@ -121,7 +124,7 @@ class Served:
         with self.lab() as lab, lab.database.writing() as db:
             db.hold()
             now_utc = lab.now_utc()
-            row = study_rows.add(db, slug, definition.title, "test", definition.canonical, now_utc)
+            row = study_rows.add(db, slug, definition.title, mode, definition.canonical, now_utc)
             studies.freeze(db, lab, row, definition)
         return slug
 

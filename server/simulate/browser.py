@@ -19,15 +19,19 @@ class RobotError(Exception):
 
 
 class Browser:
-    """One robot's connection to one server. `retries` counts requests that had to be sent again."""
+    """One robot's connection to one server. `retries` counts requests that had to be sent again.
+
+    Without a signature it passes for a person: for tests of recruitment, at a made-up marketplace.
+    """
 
     def __init__(
-        self, url: str, transport: httpx.AsyncBaseTransport, robot_signature: str, user_agent: str
+        self, url: str, transport: httpx.AsyncBaseTransport, robot_signature: str | None, user_agent: str
     ) -> None:
+        signed = {"X-Hatlab-Robot": robot_signature} if robot_signature else {}
         self._client = httpx.AsyncClient(
             base_url=url,
             transport=transport,
-            headers={"User-Agent": user_agent, "X-Hatlab-Robot": robot_signature},
+            headers={"User-Agent": user_agent, **signed},
             follow_redirects=True,
             timeout=httpx.Timeout(ANSWERS_MAX_S),
         )

@@ -27,6 +27,10 @@ class Step(NamedTuple):
     action: int
 
 
+class LeftError(Exception):
+    """Raised by a robot's `pace`: it walks away without a word, as people do."""
+
+
 @dataclass(slots=True)
 class Result:
     """What came of one robot."""
@@ -34,7 +38,7 @@ class Result:
     index: int
     finished: bool = False
     left: bool = False
-    """Walked away before the end, as it was told to."""
+    """Walked away before the end."""
     code: str = ""
     """What the last page said to hand in."""
     error: str | None = None
@@ -60,14 +64,14 @@ class Robot:
     pace: Callable[[], Any]
     answers: Mapping[str, str] = field(default_factory=dict)
     """Right answers by `<kind of form>.<question>`: a robot reads no instructions."""
-    leaves_after: int | None = None
-    """Pages after which the robot walks away without a word; None: it stays to the end."""
 
     async def walk(self) -> Result:
         """Walk the whole flow; whatever stops the robot is kept in `result.error`."""
         try:
             await self._walk()
-            self.result.finished = not self.result.left
+            self.result.finished = True
+        except LeftError:
+            self.result.left = True
         except RobotError as error:
             self.result.error = str(error)
         except (httpx.HTTPError, KeyError, TypeError, ValueError, IndexError) as error:
@@ -86,10 +90,7 @@ class Robot:
         if not here.startswith("/p/"):
             raise RobotError(f"no session after consent: {pages.read(response.text).title!r}")
         self.result.key = here.split("/")[2]
-        for number in range(PAGES_MAX):
-            if number == self.leaves_after:
-                self.result.left = True
-                return
+        for _ in range(PAGES_MAX):
             page = pages.read(response.text)
             onward, asked = page.form_to("/next"), page.form_to("/answers")
             if asked is not None:

@@ -1,5 +1,6 @@
 """The command line as a user types it: exit codes, one-line refusals, and what init leaves behind."""
 
+import shutil
 import socket
 import subprocess
 import sys
@@ -45,6 +46,20 @@ class Shell:
 
 @pytest.fixture(name="hatlab")
 def shell_in_an_empty_folder(tmp_path: Path) -> Shell:
+    return Shell(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which `hatlab init` was run."""
+    folder = tmp_path_factory.mktemp("initialised")
+    assert Shell(folder)("init").returncode == 0
+    return folder
+
+
+@pytest.fixture
+def initialised(once: Path, tmp_path: Path) -> Shell:
+    shutil.copytree(once, tmp_path, dirs_exist_ok=True)
     return Shell(tmp_path)
 
 
@@ -109,15 +124,14 @@ def test_a_setting_that_cannot_be_used_is_named_but_not_repeated(
     assert value not in done.stderr
 
 
-def test_an_unknown_study_is_named(hatlab: Shell) -> None:
-    assert hatlab("init").returncode == 0
-    done = hatlab("export", "nobody", "--out", "x")
+def test_an_unknown_study_is_named(initialised: Shell) -> None:
+    done = initialised("export", "nobody", "--out", "x")
     assert done.returncode == 2
     assert "nobody" in done.stderr
 
 
-def test_erasing_a_person_asks_first_and_says_if_there_is_nobody(hatlab: Shell) -> None:
-    assert hatlab("init").returncode == 0
+def test_erasing_a_person_asks_first_and_says_if_there_is_nobody(initialised: Shell) -> None:
+    hatlab = initialised
     words = ("erase", "traffic-junction", "--marketplace", "prolific", "--external-id", "ada")
     nobody = hatlab(*words)
     assert nobody.returncode == 2
@@ -137,16 +151,15 @@ def test_erasing_a_person_asks_first_and_says_if_there_is_nobody(hatlab: Shell) 
     assert hatlab("verify").returncode == 0
 
 
-def test_a_port_that_is_taken_is_said_before_anything_starts(hatlab: Shell) -> None:
-    assert hatlab("init").returncode == 0
+def test_a_port_that_is_taken_is_said_before_anything_starts(initialised: Shell) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
-        done = hatlab("serve", "--port", str(taken.getsockname()[1]))
+        done = initialised("serve", "--port", str(taken.getsockname()[1]))
     assert done.returncode == 2
     assert "choose another --host or --port" in done.stderr
 
 
-def test_a_server_says_where_it_is_which_agent_it_left_out_and_stops_when_told(hatlab: Shell) -> None:
-    assert hatlab("init").returncode == 0
+def test_a_server_says_where_it_is_which_agent_it_left_out_and_stops_when_told(initialised: Shell) -> None:
+    hatlab = initialised
     broken = hatlab.folder / "bundles" / "parent_child" / "broken"
     broken.mkdir(parents=True)
     (broken / "manifest.json").write_text("{")
