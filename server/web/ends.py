@@ -1,9 +1,9 @@
 """What is told at each end that somebody in a study can come to: where they stand, and what to do next."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from server.domain.money import shown
+from server.domain.money import reward_minor, shown
 from server.domain.participation import State as Standing
 from server.domain.study import StudyDefinition
 from server.recruitment import mturk
@@ -19,6 +19,15 @@ class Told(NamedTuple):
     paragraphs: tuple[str, ...]
 
 
+HEADINGS: Mapping[Standing, str] = {
+    Standing.FINISHED: "Thank you, you are finished",
+    Standing.FAILED: "Thank you, you are finished",
+    Standing.WITHDRAWN: "You have left the study",
+    Standing.SCREENED_OUT: "The study ends here for you",
+    Standing.TIMED_OUT: "Your time for this study is over",
+    Standing.RETURNED: "You have returned your place",
+    Standing.REJECTED: "This session is closed",
+}
 KEPT = "What you did so far is kept, as you allowed."
 ERASED = (
     "What you did in the study has been deleted. The identifier that pays you is kept until you are paid."
@@ -71,18 +80,19 @@ def link_of(state: State, code: str, submit_hosts: Collection[str]) -> ExitLink 
 def told_of(state: State) -> Told:
     """The words of an end; whoever failed attention checks is thanked like everybody."""
     study, standing = state.study, state.state
+    heading = HEADINGS[standing]
     contact = CONTACT.format(contact=study.contact)
     pay = WITH_CODE if state.code else BACK
     if standing in {Standing.FINISHED, Standing.FAILED}:
-        return Told("good", "Thank you, you are finished", (study.texts.complete,))
+        return Told("good", heading, (study.texts.complete,))
     if standing is Standing.WITHDRAWN:
-        return Told("info", "You have left the study", (KEPT if state.data_kept else ERASED, pay))
+        return Told("info", heading, (KEPT if state.data_kept else ERASED, pay))
     if standing is Standing.SCREENED_OUT:
-        return Told("info", "The study ends here for you", screened_out(state.code or "", contact))
+        return Told("info", heading, screened_out(state.code or "", contact))
     others: dict[Standing, Told] = {
         Standing.TIMED_OUT: Told(
             "wait",
-            "Your time for this study is over",
+            heading,
             (
                 "You were away for a while, and your place has been given to somebody else.",
                 "Your site may let you take a new place: then its link brings you back to where you were.",
@@ -91,7 +101,7 @@ def told_of(state: State) -> Told:
         ),
         Standing.RETURNED: Told(
             "info",
-            "You have returned your place",
+            heading,
             (
                 "Nothing more is expected of you.",
                 "If you take a place again on the site that sent you, its link brings you back here.",
@@ -99,7 +109,7 @@ def told_of(state: State) -> Told:
         ),
         Standing.REJECTED: Told(
             "stop",
-            "This session is closed",
+            heading,
             ("The site that sent you has closed your submission.", contact),
         ),
     }
@@ -152,15 +162,9 @@ def paid_of(state: State) -> tuple[tuple[str, str], ...]:
     pay = state.study.pay
     if pay is None:
         return ()
-    amounts = {
-        Standing.FINISHED: pay.reward_minor,
-        Standing.FAILED: pay.reward_minor,
-        Standing.WITHDRAWN: pay.partial_minor,
-        Standing.SCREENED_OUT: pay.screen_out_minor,
-    }
     lines = []
-    if amounts.get(state.state):
-        lines.append(("For your time", shown(amounts[state.state], pay.currency)))
+    if reward := reward_minor(pay, state.state):
+        lines.append(("For your time", shown(reward, pay.currency)))
     if state.state in {Standing.FINISHED, Standing.FAILED} and pay.bonus_success_minor:
         won = f"Bonus for {state.progress.won} of {state.progress.rounds} rounds"
         lines.append((won, shown(state.progress.bonus_minor, pay.currency)))

@@ -14,6 +14,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 
+from benchmarks.rounds_only import ROUNDS_ONLY
 from models.envs import registry
 from models.policies import bundle
 from models.policies.lexicon import Lexicon
@@ -102,7 +103,8 @@ def shorten(here: Laboratory) -> None:
         for template, changes in SHORT.items():
             values = tomllib.loads((ROOT / "server" / "studies" / f"{template}.toml").read_text())
             arms = [arm for arm in values["arms"] if arm["bundle"] in AGENTS]
-            definition = study.read(values | changes | {"arms": arms, "completion_url": PROLIFIC})
+            short = values | ROUNDS_ONLY | changes
+            definition = study.read(short | {"arms": arms, "completion_url": PROLIFIC})
             slug = studies.create(
                 db, lab, definition.model_dump(mode="json"), definition.title, definition.slug
             )

@@ -12,6 +12,10 @@ import typer
 from typer.core import TyperGroup
 
 from server.cli import MODELS_COMMANDS
+from server.services import enrol
+from server.services.lab import Lab
+from server.settings import Settings
+from tests.server.services.steps import DESKTOP, prolific
 
 REPOSITORY = Path(__file__).parents[2]
 PASSWORD = "correct horse"
@@ -87,6 +91,10 @@ def test_a_password_from_the_environment_is_not_printed(hatlab: Shell) -> None:
         (("serve",), "run `hatlab init`"),
         (("verify",), "run `hatlab init`"),
         (("export", "parent-child", "--out", "x"), "run `hatlab init`"),
+        (("erase", "parent-child"), "name one person"),
+        (("erase", "parent-child", "--participant", "P1", "--marketplace", "m"), "name one person"),
+        (("erase", "parent-child", "--external-id", "ada"), "name one person"),
+        (("erase", "parent-child", "--participant", "P1"), "run `hatlab init`"),
         (("simulate", "parent-child", "--participants", "1", "--seed", "1"), "run `hatlab init`"),
     ],
 )
@@ -120,6 +128,27 @@ def test_an_unknown_study_is_named(initialised: Shell) -> None:
     done = initialised("export", "nobody", "--out", "x")
     assert done.returncode == 2
     assert "nobody" in done.stderr
+
+
+def test_erasing_a_person_asks_first_and_says_if_there_is_nobody(initialised: Shell) -> None:
+    hatlab = initialised
+    words = ("erase", "traffic-junction", "--marketplace", "prolific", "--external-id", "ada")
+    nobody = hatlab(*words)
+    assert nobody.returncode == 2
+    assert nobody.stdout == ""
+    assert nobody.stderr == "hatlab: nobody in traffic-junction is known under that id of prolific\n"
+    lab = Lab.without_agents(Settings(database_url=hatlab.settings["HATLAB_DATABASE_URL"]))
+    with lab.database.writing() as db:
+        enrol.consent(db, lab, "traffic-junction", prolific("ada"), agree=False, device=DESKTOP)
+    lab.database.close()
+    unsure = hatlab(*words)
+    assert unsure.returncode == 130, "nobody answered the question"
+    done = hatlab(*words, "--yes")
+    assert done.returncode == 0, done.stderr
+    assert "the note that they declined" in done.stdout
+    assert "deleted" in done.stdout
+    assert hatlab(*words).returncode == 2
+    assert hatlab("verify").returncode == 0
 
 
 def test_a_port_that_is_taken_is_said_before_anything_starts(initialised: Shell) -> None:
@@ -191,7 +220,16 @@ def test_every_command_of_the_science_is_mounted() -> None:
 def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:
     done = hatlab("--help")
     assert done.returncode == 0, done.stderr
-    for command in ("init", "serve", "verify", "export", "simulate", "fake-prolific", *MODELS_COMMANDS):
+    for command in (
+        "init",
+        "serve",
+        "verify",
+        "export",
+        "erase",
+        "simulate",
+        "fake-prolific",
+        *MODELS_COMMANDS,
+    ):
         assert command in done.stdout
 
 
