@@ -13,6 +13,13 @@ NO_ASSIGNMENT = "ASSIGNMENT_ID_NOT_AVAILABLE"
 SUBMIT_HOSTS = ("https://www.mturk.com", "https://workersandbox.mturk.com")  # anything else: open redirect
 FRAME_HOSTS = ("https://worker.mturk.com", *SUBMIT_HOSTS)
 
+HOME, SANDBOX_HOME = "https://worker.mturk.com", "https://workersandbox.mturk.com"
+
+
+def home(parameters: Mapping[str, str]) -> str:
+    """The worker site that the link came from; workers of the sandbox go back to the sandbox."""
+    return SANDBOX_HOME if parameters.get("turkSubmitTo", "").startswith(SANDBOX_HOME) else HOME
+
 
 def recognise(query: Mapping[str, str]) -> Arrival | None:
     """The arrival, where the link comes from MTurk; a preview has no worker and no assignment."""
