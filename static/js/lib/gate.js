@@ -130,18 +130,18 @@ export function lacking(page) {
  * @param {Check} check
  */
 export function told(gate, check) {
-  const { checks, needs, size, refresh_hz } = gate;
+  const { checks, needs, size } = gate;
   const good = checks[check] === "good";
   if (check === "keyboard") return good ? "works" : wanted(gate.keysLeft);
   if (check === "viewport") {
     const now = `${size.width} by ${size.height}`;
-    return good ? "large enough" : `is ${now}; please make it ${needs.width_min} by ${needs.height_min} or larger`;
+    return good ? "large enough" : `is ${now}; make it at least ${needs.width_min} by ${needs.height_min}`;
   }
   if (check === "frames") {
     if (good) return "fast enough";
-    return checks.frames === "open" ? "is being measured …" : `${refresh_hz ?? 0} pictures a second; too slow`;
+    return checks.frames === "open" ? "is being measured …" : "is too slow for the game";
   }
-  return good ? "is recent enough" : "is too old; a current Chrome, Edge, Firefox or Safari works";
+  return good ? "new enough" : "is too old; use a new Chrome, Edge, Firefox or Safari";
 }
 
 /** @type {Record<string, string>} */

@@ -39,7 +39,7 @@ const keys = numbers.map((number) => {
   key.addEventListener("click", () => pick(number));
   return key;
 });
-const eraser = el("button", { class: "button", type: "button" }, "Remove this mark");
+const eraser = el("button", { class: "button button-small", type: "button" }, "Remove mark");
 
 /** @param {HTMLElement} item */
 function signOf(item) {
@@ -131,7 +131,7 @@ find("#probe-lead").textContent = "Pick a sign, then the square that you think i
 for (const item of form.items) item.hidden = true;
 board.append(picture);
 area.append(board);
-form.element.append(told, panel, el("div", { class: "keys digits" }, ...keys), eraser);
+form.element.append(told, eraser, panel, el("div", { class: "keys digits" }, ...keys));
 area.hidden = false;
 draw();
 startBar();
