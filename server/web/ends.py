@@ -6,11 +6,11 @@ from typing import NamedTuple
 from server.domain.money import reward_minor, shown
 from server.domain.participation import State as Standing
 from server.domain.study import StudyDefinition
-from server.recruitment import mturk
+from server.recruitment import mturk, prolific
 from server.recruitment.arrival import Arrival, ExitLink
 from server.recruitment.recognition import exit_link
 from server.services.pages import Page as State
-from server.web.pages import EndPage, Icon
+from server.web.pages import Action, EndPage, Icon
 
 
 class Told(NamedTuple):
@@ -66,9 +66,24 @@ def end_page(state: State, submit_hosts: Collection[str] = mturk.SUBMIT_HOSTS) -
         rounds=state.progress.rounds,
         paid=paid_of(state),
         goes_by_itself=through,
+        elsewhere=None if link else home(state.marketplace, state.parameters),
         language=study.texts.language,
         direction=study.texts.direction,
     )
+
+
+def home(marketplace: str, parameters: Mapping[str, str]) -> Action | None:
+    """Where the person's work is listed on the site that sent them; none for who came by a direct link."""
+    if marketplace == "prolific":
+        return Action("Go to Prolific", prolific.HOME)
+    if marketplace == "mturk":
+        return Action("Go to Mechanical Turk", mturk.home(parameters))
+    return None
+
+
+def again(study: StudyDefinition) -> Action:
+    """For who declined and was not named: the page can be read again, and nothing was kept."""
+    return Action("Read about the study again", f"/s/{study.slug}")
 
 
 def link_of(state: State, code: str, submit_hosts: Collection[str]) -> ExitLink | None:
@@ -147,6 +162,7 @@ def refused_page(
         rounds=0,
         paid=(),
         goes_by_itself=False,
+        elsewhere=None if link and named else home(arrival.marketplace, arrival.parameters) or again(study),
         language=study.texts.language,
         direction=study.texts.direction,
     )
