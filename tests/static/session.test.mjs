@@ -128,6 +128,22 @@ test("a page that the server names is gone to", async () => {
   assert.deepEqual(left, ["/p/k"]);
 });
 
+test("the end of a round that was left for questions is not shown again", async () => {
+  const storage = new FakeStorage();
+  await page([{ status: 200, body: { page: "/p/k" } }], storage).session.open(7);
+  const { session, requests } = page([{ status: 200, body: parentView({ round: 8 }) }], storage);
+  assert.equal((await session.open(null))?.resumed, false);
+  assert.deepEqual(requests, [{ url: URLS.round, body: { after: 7 } }]);
+});
+
+test("a reload at the end of a round asks for nothing but the round in hand", async () => {
+  const storage = new FakeStorage();
+  await page([{ status: 200, body: parentView({ round: 8 }) }], storage).session.open(7);
+  const { session, requests } = page([{ status: 200, body: parentView({ round: 8 }) }], storage);
+  await session.open(null);
+  assert.deepEqual(requests, [{ url: URLS.round, body: { after: null } }]);
+});
+
 test("what is neither view nor page is said, and never leads into a loop of reloads", async () => {
   for (const status of [403, 404, 410, 413, 422]) {
     const { session, said, left } = page([{ status, body: { title: "no" } }]);

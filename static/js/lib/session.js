@@ -42,8 +42,9 @@ export class Session {
   async open(after) {
     if (!this.#flushed) await this.#flush();
     this.#flushed = true;
-    const answer = await this.#post(this.seams.urls.round, { after });
+    const answer = await this.#post(this.seams.urls.round, { after: after ?? this.#left });
     const view = this.#viewOf(answer);
+    if (!view && after !== null) this.#keepLeft(after);
     return view && this.#brought(view, after === null && this.#wasSeen(view));
   }
 
@@ -71,6 +72,29 @@ export class Session {
     } catch {
       // Storage forbidden: the server still knows that the round was open.
     }
+  }
+
+  /** The round whose end was left for a page of questions: its end is not shown again when the rounds go on. */
+  get #left() {
+    try {
+      const round = this.seams.storage?.getItem(this.#leftKey) ?? "";
+      return /^\d+$/.test(round) ? Number(round) : null;
+    } catch {
+      return null;
+    }
+  }
+
+  /** @param {number} round */
+  #keepLeft(round) {
+    try {
+      this.seams.storage?.setItem(this.#leftKey, String(round));
+    } catch {
+      // Storage forbidden: the end of the round is shown once more.
+    }
+  }
+
+  get #leftKey() {
+    return `hatlab:left:${this.seams.urls.page}`;
   }
 
   get #seenKey() {
