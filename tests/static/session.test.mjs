@@ -128,22 +128,6 @@ test("a page that the server names is gone to", async () => {
   assert.deepEqual(left, ["/p/k"]);
 });
 
-test("the end of a round that was left for questions is not shown again", async () => {
-  const storage = new FakeStorage();
-  await page([{ status: 200, body: { page: "/p/k" } }], storage).session.open(7);
-  const { session, requests } = page([{ status: 200, body: parentView({ round: 8 }) }], storage);
-  assert.equal((await session.open(null))?.resumed, false);
-  assert.deepEqual(requests, [{ url: URLS.round, body: { after: 7 } }]);
-});
-
-test("a reload at the end of a round asks for nothing but the round in hand", async () => {
-  const storage = new FakeStorage();
-  await page([{ status: 200, body: parentView({ round: 8 }) }], storage).session.open(7);
-  const { session, requests } = page([{ status: 200, body: parentView({ round: 8 }) }], storage);
-  await session.open(null);
-  assert.deepEqual(requests, [{ url: URLS.round, body: { after: null } }]);
-});
-
 test("what is neither view nor page is said, and never leads into a loop of reloads", async () => {
   for (const status of [403, 404, 410, 413, 422]) {
     const { session, said, left } = page([{ status, body: { title: "no" } }]);
@@ -172,4 +156,18 @@ test("roads come once a round and are kept for the steps", async () => {
   await session.open(null);
   const next = await session.decide(driverView(), 0, TIMING);
   assert.deepEqual(next?.role === "driver" ? next.roads : null, roads);
+});
+
+test("a page of questions in between does not bring back the end of a round that was left", async () => {
+  const storage = new FakeStorage();
+  const before = page([{ status: 200, body: { page: "/p/k" } }], storage);
+  await before.session.open(7);
+  const after = page([{ status: 200, body: parentView({ round: 8 }) }], storage);
+  const view = await after.session.open(null);
+  assert.deepEqual(after.requests[0]?.body, { after: 7 });
+  assert.equal(view?.resumed, false);
+  storage.broken = true;
+  const blind = page([{ status: 200, body: parentView() }], storage);
+  await blind.session.open(null);
+  assert.deepEqual(blind.requests[0]?.body, { after: null });
 });
