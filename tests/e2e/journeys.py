@@ -1,6 +1,6 @@
-"""Studies that have everything, for the walk through the whole journey: quiz, checks, questionnaires, probe, pay.
+"""Studies that have everything, for the walk through the whole journey: quiz, checks, questions, probe, pay.
 
-The German and the Arabic one say the same in fewer forms; what they are for is long words and the other direction.
+The German and the Arabic one are shorter; they are for long words and for the other direction.
 """
 
 from typing import Any
@@ -50,7 +50,12 @@ PERSON = {
     "items": [
         {"key": "age", "kind": "number", "text": "How old are you?", "minimum": 18, "maximum": 99},
         choice(
-            "games", "How often do you play computer games?", "Never", "Some times a month", "Every week", "Daily"
+            "games",
+            "How often do you play computer games?",
+            "Never",
+            "Some times a month",
+            "Every week",
+            "Daily",
         ),
         {"key": "idea", "kind": "text", "text": "What helped you in the game?", "required": False},
     ],
@@ -99,11 +104,26 @@ WHOLE: dict[str, tuple[str, dict[str, Any]]] = {
                     answer=1,
                     role="parent",
                 ),
-                choice("say", "How many signs can you send in a round?", "As many as I like", "One", answer=2, role="child"),
+                choice(
+                    "say",
+                    "How many signs can you send in a round?",
+                    "As many as I like",
+                    "One",
+                    answer=2,
+                    role="child",
+                ),
                 choice("time", "Is there a time limit?", "Yes, ten seconds", "No", answer=2),
             ],
             "attention": [
-                choice("colour", "Please choose “Green”, so that we know that you read this.", "Red", "Green", "Blue", answer=2, after=1)
+                choice(
+                    "colour",
+                    "Please choose “Green”, so that we know that you read this.",
+                    "Red",
+                    "Green",
+                    "Blue",
+                    answer=2,
+                    after=1,
+                )
             ],
         },
     ),
@@ -130,16 +150,16 @@ WHOLE: dict[str, tuple[str, dict[str, Any]]] = {
 
 GERMAN_TEXTS = {
     "language": "de",
-    "welcome": "Sie steuern ein Auto über eine Kreuzung. Wir möchten verstehen, wie Menschen und Computer einander verstehen.",
+    "welcome": "Sie steuern ein Auto über eine Kreuzung. Wir möchten sehen, wie man mit Computern spielt.",
     "consent_version": "de-1",
     "consent": [
-        "Was Sie tun: Sie lesen eine kurze Anleitung und spielen einige Runden mit zwei Tasten. Sie können jederzeit aufhören.",
-        "Was wir aufzeichnen: Ihre Tastendrücke und Ihre Reaktionszeiten. Die Datenschutzgrundverordnung und die Einwilligungserklärungsaufbewahrungsfristen werden eingehalten.",
-        "Aufwandsentschädigungsauszahlung: Sie erhalten den genannten Betrag über die Rekrutierungsplattform.",
+        "Was Sie tun: Sie lesen eine Anleitung und spielen mit zwei Tasten. Sie können jederzeit aufhören.",
+        "Was wir aufzeichnen: Tasten und Zeiten. Einwilligungserklärungsaufbewahrungsfristen gelten.",
+        "Aufwandsentschädigungsauszahlung: Sie erhalten den Betrag über die Rekrutierungsplattform.",
     ],
-    "agree": "Ich bin mindestens 18 Jahre alt, habe diese Einverständniserklärungsseite gelesen und nehme freiwillig teil.",
+    "agree": "Ich bin 18 oder älter und habe die Einverständniserklärungsseite gelesen.",
     "instructions": [
-        "Denken Sie an die Geschwindigkeitsbegrenzungsvorschriften des Straßenverkehrsordnungswidrigkeitenrechts.",
+        "Denken Sie an die Geschwindigkeitsbegrenzungsvorschriften der Straßenverkehrsordnung.",
     ],
     "declined": "Sie nehmen nicht teil. Über Sie wurde nichts gespeichert.",
     "complete": "Vielen Dank. Alles ist sicher angekommen.",
@@ -176,11 +196,11 @@ ARABIC_ASKED = {
         scale("effort", "الجهد: كم كان عليك أن تعمل؟", "منخفض جدا", "مرتفع جدا"),
     ],
 }
-SHORT_TRAFFIC = {"trials_per_block": 1, "step_limit": 20, "pay": PAY, "codes": CODES, "completion_url": PROLIFIC}
+SHORT = {"trials_per_block": 1, "step_limit": 20, "pay": PAY, "codes": CODES, "completion_url": PROLIFIC}
 WHOLE["deutsch"] = (
     "traffic-junction",
     {
-        **SHORT_TRAFFIC,
+        **SHORT,
         "title": "Kreuzungsüberquerungsgeschicklichkeitsspiel",
         "texts": GERMAN_TEXTS,
         "quiz": GERMAN_QUIZ,
@@ -189,7 +209,7 @@ WHOLE["deutsch"] = (
 WHOLE["arabic"] = (
     "traffic-junction",
     {
-        **SHORT_TRAFFIC,
+        **SHORT,
         "title": "عبور التقاطع",
         "texts": ARABIC_TEXTS,
         "questionnaires": [ARABIC_ASKED],

@@ -104,9 +104,7 @@ def shorten(here: Laboratory) -> None:
             arms = [arm for arm in values["arms"] if arm["bundle"] in AGENTS]
             named = {"slug": slug, "arms": arms, "completion_url": PROLIFIC}
             definition = study.read(values | changes | named)
-            slug = studies.create(
-                db, lab, definition.model_dump(mode="json"), definition.title, definition.slug
-            )
+            studies.create(db, lab, definition.model_dump(mode="json"), definition.title, slug)
             studies.freeze(db, lab, studies.find(db, slug).row.id, definition)
     lab.database.close()
 
