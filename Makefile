@@ -5,6 +5,8 @@ TORCH_INDEX ?=
 HOST ?= 127.0.0.1
 PORT ?= 8000
 WORKERS ?= 1
+# Processes that share the tests.
+JOBS ?= 2
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -28,7 +30,7 @@ serve: $(RUNTIME) ## install, migrate, make the two demo studies, start the serv
 
 test: $(DEV) $(if $(HAVE_NODE),$(NODE)) ## run all tests (browser tests need Node 20 and Chromium)
 	@.ci/need-browser "$(HAVE_NODE)"
-	$(BIN)/python -m pytest -m "not learn and not torture"
+	$(BIN)/python -m pytest -n $(JOBS) -m "not learn and not torture"
 	$(if $(HAVE_NODE),npm test --silent)
 
 check: $(DEV) $(if $(HAVE_NODE),$(NODE)) ## lint, types, floors: what CI checks
@@ -55,14 +57,15 @@ train: $(RUNTIME) ## train one recipe again: make train RECIPE=models/recipes/â€
 learn: $(DEV) ## slow tests: do the recipes still learn?
 	$(BIN)/python -m pytest -m learn
 
-torture: $(DEV) ## kill -9 the server 20 times under 20 robots, on SQLite and on PostgreSQL
+torture: $(DEV) ## kill -9 the server under robots, and under a whole study with a made-up marketplace
 	$(BIN)/python -m tests.torture
 
 screenshots: $(RUNTIME) $(NODE) ## take the pictures of README and docs again (needs Node 20 and Chromium)
 	node tests/e2e/screenshots.mjs docs/images
 
-docs: $(DEV) ## write the generated documents again (data dictionary, released agents)
+docs: $(DEV) ## write the generated documents again (data dictionary, journey, released agents)
 	$(BIN)/python -m server.services.codebook > docs/data-dictionary.md
+	$(BIN)/python -m server.web.journey_map > docs/journey.md
 	$(BIN)/python -m models.roster > docs/released-agents.md
 
 figures: $(RUNTIME) ## draw the paper's figures again from the released agents (a few minutes)

@@ -18,6 +18,7 @@ class Sheet:
     """One CSV file in the making: RFC 4180, the header of the codebook first."""
 
     def __init__(self, table: str) -> None:
+        self.table = table
         self.name = f"{table}.csv"
         self._text = io.StringIO()
         self._writer = csv.writer(self._text, lineterminator="\r\n")
@@ -51,18 +52,29 @@ class Sheet:
         return {"rows": self._rows, "bytes": self._bytes, "sha256": self._digest.hexdigest()}
 
 
-def safe(row: Sequence[Any], guarded: Sequence[int]) -> Sequence[Any]:
-    """Put `'` before the texts that a spreadsheet would run.
+def plain(header: Sequence[str], rows: Iterable[Sequence[str]]) -> bytes:
+    """A small CSV file of texts that is in no codebook."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow(header)
+    writer.writerows(safe(row, range(len(header))) for row in rows)
+    return text.getvalue().encode()
 
-    >>> safe(["=1+1", -2], [0])
+
+def safe(row: Sequence[Any], guarded: Sequence[int]) -> Sequence[Any]:
+    """Put `'` before the texts that a spreadsheet would run; numbers stay numbers.
+
+    >>> safe(["=1+1", -2], [0, 1])
     ["'=1+1", -2]
     """
     for index in guarded:
-        if row[index] and row[index][0] in UNSAFE:
+        cell = row[index]
+        if cell and cell.__class__ is str and cell[0] in UNSAFE:
             break
     else:
         return row
-    return [
-        f"'{cell}" if index in guarded and cell and cell[0] in UNSAFE else cell
-        for index, cell in enumerate(row)
-    ]
+    return [guard(cell) if index in guarded else cell for index, cell in enumerate(row)]
+
+
+def guard(cell: Any) -> Any:
+    return f"'{cell}" if isinstance(cell, str) and cell[:1] in UNSAFE else cell

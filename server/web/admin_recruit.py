@@ -229,7 +229,7 @@ def review(
             f"recruitment/{posting}/confirm",
             "Do this at the marketplace?",
             tuple(costs(found, chosen)),
-            f"Do {len(chosen)}",
+            "Yes, do it" if len(chosen) == 1 else f"Yes, do all {len(chosen)}",
             fields={f"{DO}{each.key}": "1" for each in chosen},
         )
 

@@ -1,9 +1,9 @@
 """What is told at each end that somebody in a study can come to: where they stand, and what to do next."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from server.domain.money import shown
+from server.domain.money import reward_minor, shown
 from server.domain.participation import State as Standing
 from server.domain.study import StudyDefinition
 from server.recruitment import mturk, prolific
@@ -19,6 +19,15 @@ class Told(NamedTuple):
     paragraphs: tuple[str, ...]
 
 
+HEADINGS: Mapping[Standing, str] = {
+    Standing.FINISHED: "Thank you, you are finished",
+    Standing.FAILED: "Thank you, you are finished",
+    Standing.WITHDRAWN: "You have left the study",
+    Standing.SCREENED_OUT: "The study ends here for you",
+    Standing.TIMED_OUT: "Your time for this study is over",
+    Standing.RETURNED: "You have returned your place",
+    Standing.REJECTED: "This session is closed",
+}
 KEPT = "What you did so far is kept, as you allowed."
 ERASED = (
     "What you did in the study has been deleted. The identifier that pays you is kept until you are paid."
@@ -38,10 +47,10 @@ DEVICES = {
 CONTACT = "If you think that this is a mistake, write to {contact}."
 
 
-def end_page(state: State) -> EndPage:
+def end_page(state: State, submit_hosts: Collection[str] = mturk.SUBMIT_HOSTS) -> EndPage:
     study, told = state.study, told_of(state)
     code = state.code or ""
-    link = link_of(state, code)
+    link = link_of(state, code, submit_hosts)
     through = state.state in {Standing.FINISHED, Standing.FAILED}
     return EndPage(
         title=study.title,
@@ -77,27 +86,28 @@ def again(study: StudyDefinition) -> Action:
     return Action("Read about the study again", f"/s/{study.slug}")
 
 
-def link_of(state: State, code: str) -> ExitLink | None:
+def link_of(state: State, code: str, submit_hosts: Collection[str]) -> ExitLink | None:
     if not code:
         return None
-    return exit_link(state.marketplace, code, state.parameters, state.study.completion_url)
+    return exit_link(state.marketplace, code, state.parameters, state.study.completion_url, submit_hosts)
 
 
 def told_of(state: State) -> Told:
     """The words of an end; whoever failed attention checks is thanked like everybody."""
     study, standing = state.study, state.state
+    heading = HEADINGS[standing]
     contact = CONTACT.format(contact=study.contact)
     pay = WITH_CODE if state.code else BACK
     if standing in {Standing.FINISHED, Standing.FAILED}:
-        return Told("good", "Thank you, you are finished", (study.texts.complete,))
+        return Told("good", heading, (study.texts.complete,))
     if standing is Standing.WITHDRAWN:
-        return Told("info", "You have left the study", (KEPT if state.data_kept else ERASED, pay))
+        return Told("info", heading, (KEPT if state.data_kept else ERASED, pay))
     if standing is Standing.SCREENED_OUT:
-        return Told("info", "The study ends here for you", screened_out(state.code or "", contact))
+        return Told("info", heading, screened_out(state.code or "", contact))
     others: dict[Standing, Told] = {
         Standing.TIMED_OUT: Told(
             "wait",
-            "Your time for this study is over",
+            heading,
             (
                 "You were away for a while, and your place has been given to somebody else.",
                 "Your site may let you take a new place: then its link brings you back to where you were.",
@@ -106,7 +116,7 @@ def told_of(state: State) -> Told:
         ),
         Standing.RETURNED: Told(
             "info",
-            "You have returned your place",
+            heading,
             (
                 "Nothing more is expected of you.",
                 "If you take a place again on the site that sent you, its link brings you back here.",
@@ -114,19 +124,28 @@ def told_of(state: State) -> Told:
         ),
         Standing.REJECTED: Told(
             "stop",
-            "This session is closed",
+            heading,
             ("The site that sent you has closed your submission.", contact),
         ),
     }
     return others[standing]
 
 
-def refused_page(study: StudyDefinition, status: str, arrival: Arrival, reason: str = "") -> EndPage:
+def refused_page(
+    study: StudyDefinition,
+    status: str,
+    arrival: Arrival,
+    reason: str = "",
+    submit_hosts: Collection[str] = mturk.SUBMIT_HOSTS,
+) -> EndPage:
     """The end of who declined, or whose device does not fit, before anything was begun."""
     declined = status == "declined"
     code = "" if declined else study.codes.screened_out
     named = arrival.external_id is not None
-    link = exit_link(arrival.marketplace, code, arrival.parameters, study.completion_url) if code else None
+    link = None
+    if code:
+        way = (arrival.marketplace, code, arrival.parameters, study.completion_url)
+        link = exit_link(*way, submit_hosts)
     back = WITH_CODE if code else BACK if named else "You may close this window."
     why = (study.texts.declined,) if declined else (DEVICES.get(reason, DEVICE), NO_REJECTION)
     return EndPage(
@@ -159,15 +178,9 @@ def paid_of(state: State) -> tuple[tuple[str, str], ...]:
     pay = state.study.pay
     if pay is None:
         return ()
-    amounts = {
-        Standing.FINISHED: pay.reward_minor,
-        Standing.FAILED: pay.reward_minor,
-        Standing.WITHDRAWN: pay.partial_minor,
-        Standing.SCREENED_OUT: pay.screen_out_minor,
-    }
     lines = []
-    if amounts.get(state.state):
-        lines.append(("For your time", shown(amounts[state.state], pay.currency)))
+    if reward := reward_minor(pay, state.state):
+        lines.append(("For your time", shown(reward, pay.currency)))
     if state.state in {Standing.FINISHED, Standing.FAILED} and pay.bonus_success_minor:
         won = f"Bonus for {state.progress.won} of {state.progress.rounds} rounds"
         lines.append((won, shown(state.progress.bonus_minor, pay.currency)))

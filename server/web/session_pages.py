@@ -41,7 +41,7 @@ def bonus_rule(study: StudyDefinition) -> str:
 
 
 def bonuses(study: StudyDefinition) -> list[str]:
-    """What 0, 1, 2 … rounds won are worth, in words, for the bar while playing; empty without a bonus."""
+    """What 0, 1, 2 … rounds won are worth, in words; empty without a bonus: the bar counts on."""
     pay = study.pay
     if pay is None or not pay.bonus_success_minor:
         return []

@@ -49,14 +49,6 @@ def browser() -> None:
     pytest.skip(told)
 
 
-def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """A skipped browser test is said at the end, where nobody can miss it."""
-    skipped = [each for each in terminalreporter.stats.get("skipped", []) if "tests/e2e" in each.nodeid]
-    if skipped:
-        told = f"{len(skipped)} BROWSER TESTS SKIPPED: they need {', '.join(missing())}"
-        terminalreporter.write_line(f"*** {told} ***", yellow=True, bold=True)
-
-
 @pytest.fixture(scope="module")
 def lab(browser: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Laboratory]:
     with laboratory(tmp_path_factory.mktemp("laboratory")) as here:

@@ -1,6 +1,6 @@
-"""Studies that have everything, for the walk through the whole journey: quiz, checks, questions, probe, pay.
+"""Studies that have everything, for the walk through the whole journey: quiz, checks, questionnaires, probe, pay.
 
-The German and the Arabic one are shorter; they are for long words and for the other direction.
+The German and the Arabic one say the same in fewer forms; what they are for is long words and the other direction.
 """
 
 from typing import Any
@@ -150,16 +150,16 @@ WHOLE: dict[str, tuple[str, dict[str, Any]]] = {
 
 GERMAN_TEXTS = {
     "language": "de",
-    "welcome": "Sie steuern ein Auto über eine Kreuzung. Wir möchten sehen, wie man mit Computern spielt.",
+    "welcome": "Sie steuern ein Auto über eine Kreuzung. Wir möchten verstehen, wie Menschen und Computer einander verstehen.",
     "consent_version": "de-1",
     "consent": [
-        "Was Sie tun: Sie lesen eine Anleitung und spielen mit zwei Tasten. Sie können jederzeit aufhören.",
-        "Was wir aufzeichnen: Tasten und Zeiten. Einwilligungserklärungsaufbewahrungsfristen gelten.",
-        "Aufwandsentschädigungsauszahlung: Sie erhalten den Betrag über die Rekrutierungsplattform.",
+        "Was Sie tun: Sie lesen eine kurze Anleitung und spielen einige Runden mit zwei Tasten. Sie können jederzeit aufhören.",
+        "Was wir aufzeichnen: Ihre Tastendrücke und Ihre Reaktionszeiten. Die Datenschutzgrundverordnung und die Einwilligungserklärungsaufbewahrungsfristen werden eingehalten.",
+        "Aufwandsentschädigungsauszahlung: Sie erhalten den genannten Betrag über die Rekrutierungsplattform.",
     ],
-    "agree": "Ich bin 18 oder älter und habe die Einverständniserklärungsseite gelesen.",
+    "agree": "Ich bin mindestens 18 Jahre alt, habe diese Einverständniserklärungsseite gelesen und nehme freiwillig teil.",
     "instructions": [
-        "Denken Sie an die Geschwindigkeitsbegrenzungsvorschriften der Straßenverkehrsordnung.",
+        "Denken Sie an die Geschwindigkeitsbegrenzungsvorschriften des Straßenverkehrsordnungswidrigkeitenrechts.",
     ],
     "declined": "Sie nehmen nicht teil. Über Sie wurde nichts gespeichert.",
     "complete": "Vielen Dank. Alles ist sicher angekommen.",
@@ -196,11 +196,17 @@ ARABIC_ASKED = {
         scale("effort", "الجهد: كم كان عليك أن تعمل؟", "منخفض جدا", "مرتفع جدا"),
     ],
 }
-SHORT = {"trials_per_block": 1, "step_limit": 20, "pay": PAY, "codes": CODES, "completion_url": PROLIFIC}
+SHORT_TRAFFIC = {
+    "trials_per_block": 1,
+    "step_limit": 20,
+    "pay": PAY,
+    "codes": CODES,
+    "completion_url": PROLIFIC,
+}
 WHOLE["deutsch"] = (
     "traffic-junction",
     {
-        **SHORT,
+        **SHORT_TRAFFIC,
         "title": "Kreuzungsüberquerungsgeschicklichkeitsspiel",
         "texts": GERMAN_TEXTS,
         "quiz": GERMAN_QUIZ,
@@ -209,7 +215,7 @@ WHOLE["deutsch"] = (
 WHOLE["arabic"] = (
     "traffic-junction",
     {
-        **SHORT,
+        **SHORT_TRAFFIC,
         "title": "عبور التقاطع",
         "texts": ARABIC_TEXTS,
         "questionnaires": [ARABIC_ASKED],

@@ -14,6 +14,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 
+from benchmarks.rounds_only import ROUNDS_ONLY
 from models.envs import registry
 from models.policies import bundle
 from models.policies.lexicon import Lexicon
@@ -56,8 +57,8 @@ class Laboratory:
 
 
 @contextmanager
-def laboratory(folder: Path) -> Iterator[Laboratory]:
-    """A migrated database, two short studies, and a server that answers."""
+def laboratory(folder: Path, **settings: str) -> Iterator[Laboratory]:
+    """A migrated database, two short studies, and a server that answers; `settings` are its variables."""
     bundles = folder / "bundles"
     for name, (task, channel) in AGENTS.items():
         agent(bundles, task, name, channel)
@@ -68,6 +69,7 @@ def laboratory(folder: Path) -> Iterator[Laboratory]:
         "HATLAB_ADMIN_PASSWORD": "only for tests, never elsewhere",
         "HATLAB_PUBLIC_URL": f"http://127.0.0.1:{port}",
         "OMP_NUM_THREADS": "1",
+        **settings,
     }
     here = Laboratory(folder, environment["HATLAB_PUBLIC_URL"], environment)
     made = here.hatlab("init")
@@ -103,9 +105,12 @@ def shorten(here: Laboratory) -> None:
             values = tomllib.loads((ROOT / "server" / "studies" / f"{template}.toml").read_text())
             arms = [arm for arm in values["arms"] if arm["bundle"] in AGENTS]
             named = {"slug": slug, "arms": arms, "completion_url": PROLIFIC}
-            definition = study.read(values | changes | named)
-            studies.create(db, lab, definition.model_dump(mode="json"), definition.title, slug)
-            studies.freeze(db, lab, studies.find(db, slug).row.id, definition)
+            rounds_only = ROUNDS_ONLY if slug in short else {}
+            definition = study.read(values | rounds_only | changes | named)
+            made = studies.create(
+                db, lab, definition.model_dump(mode="json"), definition.title, definition.slug
+            )
+            studies.freeze(db, lab, studies.find(db, made).row.id, definition)
     lab.database.close()
 
 

@@ -1,6 +1,8 @@
-"""`python -m tests.torture [--record]`: 20 kills under 20 robots, on SQLite and on PostgreSQL.
+"""`python -m tests.torture [--record] [NAME …]`: 20 kills under 20 robots, on SQLite and on PostgreSQL; and a
+whole study of 250 people through a made-up marketplace, on PostgreSQL with two workers, under 10 kills.
 
-Exit 1 if anything was lost. `--record` puts the printed table into docs/measurements.md.
+NAME is sqlite, postgresql or marketplace; all of them by default. Exit 1 if anything was lost.
+`--record` puts the printed table into docs/measurements.md.
 """
 
 import sys
@@ -10,12 +12,23 @@ from rich.table import Table
 
 from benchmarks import measurements
 from benchmarks.table import machine
+from tests.torture import recruited
+from tests.torture.recruited import Settled, ordeal_by_marketplace
 from tests.torture.torture import Ordeal, Report, torture
 
 COMMAND = "make torture"
 ORDEALS = (
     Ordeal("sqlite", kills=20, robots=20, trials_per_block=20, steps_between=(10, 200)),
     Ordeal("postgresql", kills=20, robots=20, trials_per_block=20, steps_between=(10, 200)),
+)
+
+MARKETPLACE = recruited.Ordeal(
+    "postgresql",
+    kills=10,
+    finishing={"traffic-junction": 126, "parent-child": 76},
+    dropouts=48,
+    trials_per_block=20,
+    steps_between=(2_000, 4_000),
 )
 
 
@@ -43,19 +56,64 @@ def table(reports: list[Report]) -> Table:
     return shown
 
 
+def marketplace_table(report: Report, settled: Settled) -> Table:
+    shown = Table(title="a study through a made-up Prolific, kill -9 meanwhile", title_justify="left")
+    shown.add_column("")
+    shown.add_column(f"{report.ordeal.database}, {report.workers} worker(s)", justify="right")
+    for name, value in {
+        "kills": f"{report.kills}",
+        "people": f"{report.participants}",
+        "how they ended": ", ".join(f"{n} {status}" for status, n in sorted(settled.statuses.items())),
+        "steps acknowledged": f"{report.acknowledged:,}",
+        "acknowledged steps missing": f"{report.missing}",
+        "steps doubled": f"{report.doubled}",
+        "steps stored that nobody took": f"{report.unknown}",
+        "requests sent again": f"{report.sent_again:,}",
+        "payments at the marketplace": f"{settled.payments}",
+        "people paid exactly what is owed": f"{settled.paid_once}",
+        "people paid otherwise": f"{len(settled.wrong)}",
+        "differences left that can be settled": f"{settled.left_to_do}",
+        "seconds in all": f"{report.seconds:.0f}",
+        "hatlab verify, exit code": f"{report.verify_exit}",
+        "clean": "yes" if is_clean(report, settled) else "NO",
+    }.items():
+        shown.add_row(name, value)
+    return shown
+
+
+def is_clean(report: Report, settled: Settled) -> bool:
+    lost = report.missing + report.doubled + report.unknown + report.stale + len(report.errors)
+    return not lost and not settled.wrong and not settled.left_to_do and report.verify_exit == 0
+
+
 def main(arguments: list[str]) -> int:
     console = Console(width=100, record=True, highlight=False)
     console.print(machine())
-    reports = []
+    names = [each for each in arguments if not each.startswith("-")]
+    clean, reports = [], []
     for ordeal in ORDEALS:
-        reports.append(torture(ordeal))
-        console.print(f"{ordeal.database}: {reports[-1].verify_said}", markup=False)
-        for error in reports[-1].errors:
-            console.print(error, markup=False)
-    console.print(table(reports))
+        if not names or ordeal.database in names:
+            reports.append(torture(ordeal))
+            say(console, ordeal.database, reports[-1])
+    if reports:
+        console.print(table(reports))
+        clean += [report.clean for report in reports]
+    if not names or "marketplace" in names:
+        report, settled = ordeal_by_marketplace(MARKETPLACE)
+        say(console, "marketplace", report)
+        for line in settled.wrong:
+            console.print(line, markup=False)
+        console.print(marketplace_table(report, settled))
+        clean.append(is_clean(report, settled))
     if "--record" in arguments:
-        measurements.record(COMMAND, console.export_text())
-    return int(not all(report.clean for report in reports))
+        measurements.record(" ".join([COMMAND, *names]), console.export_text())
+    return int(not all(clean))
+
+
+def say(console: Console, name: str, report: Report) -> None:
+    console.print(f"{name}: {report.verify_said}", markup=False)
+    for error in report.errors:
+        console.print(error, markup=False)
 
 
 if __name__ == "__main__":

@@ -201,6 +201,7 @@ class Desk:
                 "prolific_api": f"{self.fake_url}/api/v1",
                 "prolific_token": SecretStr(TOKEN),
                 "prolific_settle_s": SETTLE_S,
+                "public_url": self.house.url,
             }
             yield replace(lab, settings=lab.settings.model_copy(update=changes))
 

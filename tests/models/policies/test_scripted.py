@@ -46,7 +46,10 @@ def test_trivial_drivers_succeed_as_often_as_they_should(
     task: str, policy: str, arrival: float | None, success: float
 ) -> None:
     task = f"traffic_junction/{task}"
-    state, _ = _play(task, scripted.make(f"scripted:{policy}"), 20_000, arrival)
+    # The standard error of 20,000 episodes is at most .0035. Who lets the front car go first loses almost
+    # never, so that 5,000 of its slow ones have one of .0006 (easy) and 0 (medium).
+    episodes = 5_000 if policy == "front-car-first" else 20_000
+    state, _ = _play(task, scripted.make(f"scripted:{policy}"), episodes, arrival)
 
     assert make_env(task).success(state).mean() == pytest.approx(success, abs=0.01)
 

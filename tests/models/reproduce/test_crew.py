@@ -1,6 +1,7 @@
 """What is missing is run, what is stored is not, and whoever is killed goes on."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -15,7 +16,7 @@ from models.reproduce import crew
 from models.reproduce.cells import Cell, Shelf
 from models.reproduce.work import Job, do
 from models.training import checkpoint
-from tests.models.reproduce.tiny import NAMES, PLAIN, laid_out
+from tests.models.reproduce.tiny import NAMES, PLAIN, laid_out, shelf_in
 
 ONE, NAMED, LATER = Cell("plain", 1), Cell("names", 1), Cell("later", 1)
 
@@ -35,6 +36,13 @@ def worked(tmp_path_factory: pytest.TempPathFactory) -> tuple[Shelf, crew.Report
     """The agent `names`, run from nothing, and so also the one that it starts from."""
     shelf = laid_out(tmp_path_factory.mktemp("tables"))
     return shelf, work(shelf, NAMED, LATER, jobs=2)
+
+
+@pytest.fixture
+def held(worked, tmp_path: Path) -> Shelf:
+    """A copy of what was worked, to change."""
+    shutil.copytree(worked[0].recipes.parent, tmp_path, dirs_exist_ok=True)
+    return shelf_in(tmp_path)
 
 
 def test_an_agent_is_run_after_the_one_of_the_same_seed_that_it_starts_from(worked) -> None:
@@ -69,8 +77,8 @@ def done(shelf: Shelf, *cells: Cell) -> Shelf:
     return shelf
 
 
-def test_a_changed_recipe_runs_again_with_all_that_starts_from_it(tmp_path: Path) -> None:
-    shelf = done(laid_out(tmp_path), ONE, NAMED)
+def test_a_changed_recipe_runs_again_with_all_that_starts_from_it(held: Shelf) -> None:
+    shelf = held
     old = shelf.record(ONE)["weights"]
     assert planned(shelf, NAMED) == []
     changed(shelf, "plain", "updates = 25", "updates = 25\nlr = 0.02")
@@ -83,14 +91,13 @@ def test_a_changed_recipe_runs_again_with_all_that_starts_from_it(tmp_path: Path
     assert (shelf.runs / "plain-1.old1" / checkpoint.FILE).exists()
 
 
-def test_a_comment_or_a_default_written_out_is_no_change(tmp_path: Path) -> None:
-    shelf = done(laid_out(tmp_path), ONE)
-    (shelf.recipes / "plain.toml").write_text("# said why\n" + PLAIN + "lr = 1e-3\n")
-    assert planned(shelf, ONE) == []
+def test_a_comment_or_a_default_written_out_is_no_change(held: Shelf) -> None:
+    (held.recipes / "plain.toml").write_text("# said why\n" + PLAIN + "lr = 1e-3\n")
+    assert planned(held, ONE) == []
 
 
-def test_force_runs_what_was_asked_for_and_nothing_else(tmp_path: Path) -> None:
-    shelf = done(laid_out(tmp_path), ONE, NAMED)
+def test_force_runs_what_was_asked_for_and_nothing_else(held: Shelf) -> None:
+    shelf = held
     kept = shelf.record(NAMED)["weights"]
     assert planned(shelf, NAMED, force=True) == [NAMED]
     do(Job.of(NAMED, shelf, force=True))
@@ -98,16 +105,15 @@ def test_force_runs_what_was_asked_for_and_nothing_else(tmp_path: Path) -> None:
     assert (shelf.runs / "names-1.old1").exists()
 
 
-def test_numbers_without_weights_are_enough_unless_someone_starts_from_them(tmp_path: Path) -> None:
-    shelf = done(laid_out(tmp_path), ONE)
-    (shelf.runs / "plain-1" / checkpoint.FILE).unlink()
-    assert planned(shelf, ONE) == []
-    assert planned(shelf, NAMED) == [ONE, NAMED]
+def test_numbers_without_weights_are_enough_unless_someone_starts_from_them(held: Shelf) -> None:
+    (held.runs / "plain-1" / checkpoint.FILE).unlink()
+    held.record_path(NAMED).unlink()
+    assert planned(held, ONE) == []
+    assert planned(held, NAMED) == [ONE, NAMED]
 
 
-def test_other_numbers_of_episodes_measure_again_and_train_nothing(tmp_path: Path) -> None:
-    shelf = done(laid_out(tmp_path), ONE)
-    more = replace(shelf, episodes=40)
+def test_other_numbers_of_episodes_measure_again_and_train_nothing(held: Shelf) -> None:
+    shelf, more = held, replace(held, episodes=40)
     before = (shelf.runs / "plain-1" / checkpoint.FILE).stat().st_mtime_ns
     assert planned(more, ONE) == [ONE]
     assert done(more, ONE).record(ONE)["episodes"] == 40

@@ -70,4 +70,9 @@ def laid_out(folder: Path) -> Shelf:
     (recipes / "plain.toml").write_text(PLAIN)
     (recipes / "names.toml").write_text(NAMES)
     (folder / "tiny.toml").write_text(TABLE)
-    return Shelf(recipes, folder / "runs", folder / "out" / "cells", folder / "bundles", 30)
+    return shelf_in(folder)
+
+
+def shelf_in(folder: Path) -> Shelf:
+    """Everything at its place in a folder that was laid out."""
+    return Shelf(folder / "recipes", folder / "runs", folder / "out" / "cells", folder / "bundles", 30)

@@ -1,6 +1,7 @@
 """A run that is killed goes on as if nothing had happened."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -83,6 +84,12 @@ def whole(tmp_path_factory):
     return run(folder / "small.toml", folder / "run", progress=False)
 
 
+@pytest.fixture
+def finished(whole, tmp_path):
+    """A copy of its folder."""
+    return shutil.copytree(whole.folder, tmp_path / "run")
+
+
 def test_a_run_killed_in_the_middle_ends_with_the_same_weights_and_log(recipe, tmp_path, whole):
     kill_after(recipe, tmp_path / "killed", updates=5)
     assert 0 < updates_saved(tmp_path / "killed") < whole.updates
@@ -152,30 +159,27 @@ def test_a_log_of_the_first_version_gets_the_new_columns(recipe, tmp_path, whole
         assert other == one | (dict.fromkeys(new - {"cpu_s"}, "") if int(one["total"]) <= 3 else {})
 
 
-def test_a_finished_run_is_only_read(recipe, tmp_path):
-    first = run(recipe, tmp_path / "run", progress=False)
-    before = (tmp_path / "run" / FILE).read_bytes()
-    again = run(recipe, tmp_path / "run", resume=True, progress=False)
-    assert (tmp_path / "run" / FILE).read_bytes() == before
-    for name, weight in first.policy.weights().items():
+def test_a_finished_run_is_only_read(recipe, finished, whole):
+    before = (finished / FILE).read_bytes()
+    again = run(recipe, finished, resume=True, progress=False)
+    assert (finished / FILE).read_bytes() == before
+    for name, weight in whole.policy.weights().items():
         assert torch.equal(weight, again.policy.weights()[name])
 
 
-def test_a_folder_with_a_run_is_not_overwritten_nor_mixed(recipe, tmp_path):
-    run(recipe, tmp_path / "run", progress=False)
+def test_a_folder_with_a_run_is_not_overwritten_nor_mixed(recipe, finished):
     with pytest.raises(TrainingError, match="holds a run already"):
-        run(recipe, tmp_path / "run", progress=False)
+        run(recipe, finished, progress=False)
     recipe.write_text(RECIPE.replace("seed = 3", "seed = 4"))
     with pytest.raises(TrainingError, match="belongs to another recipe"):
-        run(recipe, tmp_path / "run", resume=True, progress=False)
+        run(recipe, finished, resume=True, progress=False)
 
 
-def test_a_damaged_checkpoint_is_named(recipe, tmp_path):
-    run(recipe, tmp_path / "run", progress=False)
-    path = tmp_path / "run" / FILE
+def test_a_damaged_checkpoint_is_named(recipe, finished):
+    path = finished / FILE
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(CheckpointError, match=r"checkpoint\.safetensors: damaged"):
-        run(recipe, tmp_path / "run", resume=True, progress=False)
+        run(recipe, finished, resume=True, progress=False)
 
 
 def test_a_missing_start_says_what_to_train_first(recipe, tmp_path):
