@@ -1,4 +1,4 @@
-"""The command line: `hatlab init | serve | verify | export | erase | …`, and the commands of models.cli.
+"""The command line: `hatlab init | serve | verify | export | …`, and the commands of models.cli.
 
 Exit code 0: done; 1: the check failed; 2: bad input, said in one line on stderr. What is slow to import is
 imported by the command that needs it; `hatlab serve` never loads training.
@@ -251,6 +251,71 @@ def fake_prolific(
         Hooks(seed, secret=webhook_secret),
     )
     serve(fake, port, webhook_url)
+
+
+@app.command()
+def invite(
+    study: Slug,
+    names: Annotated[
+        Path | None, typer.Option(help="File with one name a line; a name says in the data who took part.")
+    ] = None,
+    count: Annotated[int | None, typer.Option(min=1, max=10_000, help="Draw so many new names.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Write a CSV file instead of printing.")] = None,
+) -> None:
+    """Write a personal link for everybody on a list. The same name always gets the same link."""
+    from server.recruitment import personal
+    from server.services import lab, sheets, studies
+
+    if (names is None) == (count is None):
+        raise BadInputError("say who is invited: either --names FILE or --count N")
+    here = lab.Lab.without_agents(settings_of_environment())
+    with here.database.reading() as db:
+        studies.find(db, study)
+    here.database.close()
+    try:
+        people = personal.drawn(count or 0) if names is None else personal.names_in(lines_of(names))
+        codes = {name: personal.code_of(name, study, here.secret_key) for name in people}
+    except ValueError as error:
+        raise BadInputError(str(error)) from error
+    rows = [(name, personal.link(here.settings.public_url, study, code)) for name, code in codes.items()]
+    if out is None:
+        typer.echo("\n".join("\t".join(row) for row in rows))
+    else:
+        out.write_bytes(sheets.plain(("name", "link"), rows))
+        typer.echo(f"{len(rows)} links: {out}")
+
+
+def lines_of(path: Path) -> list[str]:
+    """A text file's lines, whatever system wrote it.
+
+    Raises:
+        BadInputError: there is no such text file.
+    """
+    try:
+        return path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeError) as error:
+        raise BadInputError(f"cannot read {path}: it must be a text file in UTF-8") from error
+
+
+@app.command(name="fake-mturk")
+def fake_mturk(
+    port: Annotated[int, typer.Option(min=0, max=65_535, help="Port to listen on; 0: any free one.")] = 8100,
+    seed: Annotated[int, typer.Option(help="Its ids and delays follow from it.")] = 0,
+    delay: Annotated[float, typer.Option(min=0, help="Seconds until MTurk shows a submission.")] = 0.0,
+    throttle: Annotated[int, typer.Option(min=0, help="Refuse each so many-th request as busy.")] = 0,
+) -> None:
+    """Serve a Mechanical Turk of your own on loopback: requester API, worker site, ledger; nobody is paid."""
+    import uvicorn
+
+    from server import serving
+    from server.simulate.fake_mturk import announcement
+    from server.simulate.fake_mturk import fake_mturk as fake
+    from server.simulate.mturk_market import Market
+
+    place = serving.listen("127.0.0.1", port)
+    typer.echo(announcement(place.listener.getsockname()[1]))
+    site = fake(Market(seed, delay), throttle)
+    uvicorn.Server(serving.config(settings_of_environment(), site)).run([place.listener])
 
 
 def settings_of_environment() -> "Settings":

@@ -10,6 +10,7 @@ from pydantic import Field, SecretStr, field_validator
 from pydantic_settings import BaseSettings, SettingsConfigDict
 
 ADDRESS = re.compile(r"https?://[^\s/?#]+(/[^\s?#]*)?")
+SITE = re.compile(r"https?://[a-z0-9.-]+(:\d{1,5})?")
 PACKAGED_BUNDLES = Path(__file__).parents[1] / "models" / "bundles"
 
 
@@ -46,8 +47,24 @@ class Settings(BaseSettings):
     long before anybody looks and pays again."""
     prolific_webhook_secret: SecretStr | None = None
     """Secret that Prolific signs its messages with. Unset: no message is believed, changes are asked for."""
+    mturk_endpoint: str = "https://mturk-requester-sandbox.us-east-1.amazonaws.com"
+    """MTurk's requester API: the sandbox, where nobody is paid, unless another is named."""
+    mturk_access_key_id: SecretStr | None = None
+    """Access key of the MTurk requester."""
+    mturk_secret_access_key: SecretStr | None = None
+    """Secret half of it."""
+    mturk_extra_host: str = ""
+    """One site beside MTurk's own that may frame workers' pages and take their form: for development."""
 
-    @field_validator("public_url", "prolific_api")
+    @field_validator("mturk_extra_host")
+    @classmethod
+    def a_site(cls, site: str) -> str:
+        """Nothing but a scheme, a host and a port: it becomes part of a content policy."""
+        if site and not SITE.fullmatch(site):
+            raise ValueError("use a site like http://localhost:8100, without a path")
+        return site
+
+    @field_validator("public_url", "prolific_api", "mturk_endpoint")
     @classmethod
     def an_address(cls, url: str) -> str:
         """What links can begin with, without the final slash."""
@@ -55,7 +72,14 @@ class Settings(BaseSettings):
             raise ValueError("use an address like https://study.example.org")
         return url.rstrip("/")
 
-    @field_validator("secret_key", "admin_password", "prolific_token", "prolific_webhook_secret")
+    @field_validator(
+        "secret_key",
+        "admin_password",
+        "prolific_token",
+        "prolific_webhook_secret",
+        "mturk_access_key_id",
+        "mturk_secret_access_key",
+    )
     @classmethod
     def not_empty(cls, secret: SecretStr | None) -> SecretStr | None:
         """An empty variable means unset, not an empty secret."""

@@ -65,7 +65,12 @@ def key_of(action: ActionKind, submission_id: str) -> str:
 
 
 def mismatches(
-    ours: Sequence[Ours], theirs: Sequence[Theirs], ledger: Mapping[str, str], pay: Pay | None
+    ours: Sequence[Ours],
+    theirs: Sequence[Theirs],
+    ledger: Mapping[str, str],
+    pay: Pay | None,
+    *,
+    lists_everybody: bool = True,
 ) -> list[Mismatch]:
     """All differences, in the order of submissions.
 
@@ -74,6 +79,7 @@ def mismatches(
         theirs: every submission of it.
         ledger: state of every payment or request so far (`sent`, `done`, `failed`) by mismatch key.
         pay: what the study pays; None: nothing is proposed that costs.
+        lists_everybody: whether the marketplace also tells of people who have not handed in.
     """
     by_submission = {person.submission_id: person for person in ours if person.submission_id}
     by_hash = {person.external_hash: person for person in ours}
@@ -88,7 +94,8 @@ def mismatches(
                 continue
         found += between(person, their, pay)
     known = {their.submission_id for their in theirs}
-    found += [unknown_there(p) for p in ours if p.submission_id and p.submission_id not in known]
+    missing = [p for p in ours if p.submission_id and p.submission_id not in known]
+    found += [unknown_there(person) for person in missing if lists_everybody]
     return [each for each in found if ledger.get(each.key) != "done"]
 
 

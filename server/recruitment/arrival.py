@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-Marketplace = Literal["prolific", "mturk", "direct"]
+Marketplace = Literal["prolific", "mturk", "list", "direct"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,13 +13,14 @@ class Arrival:
 
     `external_id` is the marketplace's name for the person (None: direct link, nobody is named);
     `submission_id` its name for this one sitting; `parameters` all that was recognised, as it came;
-    a `preview` must not be stored.
+    a `preview` must not be stored; a `forged` one claims an invitation that this lab did not write.
     """
 
     marketplace: Marketplace
     external_id: str | None = None
     submission_id: str | None = None
     preview: bool = False
+    forged: bool = False
     parameters: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -200,6 +200,9 @@ class ProlificRecruiter:
         """Amounts of bonuses that each submission was paid: the look before anything is sent again."""
         return self._bonuses.paid(posting_id)
 
+    def remember(self, posting_id: str, external_id: str) -> None:
+        """Nothing: Prolific lets nobody take a study twice."""
+
     def _draft(self, title: str, internal_name: str) -> Study | None:
         return draft_named(self._connection, title, internal_name)
 

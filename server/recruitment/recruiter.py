@@ -157,6 +157,10 @@ class Recruiter(Protocol):
         """Amounts of the bonuses that each submission was paid so far."""
         ...
 
+    def remember(self, posting_id: str, external_id: str) -> None:
+        """Keep somebody from taking part again, where the marketplace does not do so by itself."""
+        ...
+
 
 @dataclass(frozen=True, slots=True)
 class Change:

@@ -53,7 +53,7 @@ number_permutation | string | | Number shown on screen at panel position 0, 1, 2
 allocation_probability | number | | Probability with which the allocation gave this arm and role order.
 allocation_seed | integer | | Seed of the allocation's draw, for re-randomisation tests.
 allocated_utc | utc | UTC | When the allocation was made.
-marketplace | string | | prolific, mturk or direct.
+marketplace | string | | prolific, mturk, list (a personal link of the lab's own list) or direct.
 device | string | | Device class that the browser reported at consent.
 browser | string | | Browser family and system that the browser reported at consent.
 viewport | string | CSS px | Inner size of the window at consent, width x height.

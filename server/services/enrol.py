@@ -9,6 +9,7 @@ import base64
 import secrets
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Literal
 
 from itsdangerous import BadSignature, TimestampSigner
@@ -19,7 +20,7 @@ from server.domain.errors import BadInputError, NotFoundError
 from server.domain.participation import Event, State
 from server.domain.study import StudyDefinition
 from server.ghost import panel
-from server.recruitment import recognition
+from server.recruitment import personal, recognition
 from server.recruitment.arrival import Arrival
 from server.services import journey, lease
 from server.services.lab import Lab
@@ -59,7 +60,16 @@ UNKNOWN = "unknown"
 TEXT_MAX = 120
 
 EntryKind = Literal[
-    "consent", "resume", "preview", "full", "paused", "closed", "declined", "screened_out", "not_found"
+    "consent",
+    "resume",
+    "preview",
+    "full",
+    "paused",
+    "closed",
+    "declined",
+    "screened_out",
+    "not_invited",
+    "not_found",
 ]
 Refusal = Literal["declined", "screened_out"]
 Mode = Literal["live", "test", "robot"]
@@ -217,7 +227,7 @@ def come_back(db: DbSession, lab: Lab, key: str, params: Mapping[str, str]) -> N
     Who returned a task and took it again must end the new one: MTurk takes no form for the old assignment.
     Whoever had returned or timed out goes on where they left, if a place is free.
     """
-    participant, arrival = participant_by_key(db, lab, key), arrival_of(params)
+    participant, arrival = participant_by_key(db, lab, key), recognition.recognise(params)
     known = enrolments.identity_of(db, participant.id)
     if arrival.submission_id in {None, known.submission_id}:
         return
@@ -254,7 +264,7 @@ def visit_of(
     if robot is not None:
         check_robot(lab, row.slug, robot)
         mode = "robot"
-    return Visit(row, version, definition_of(db, lab, version.id), arrival_of(params), mode)
+    return Visit(row, version, definition_of(db, lab, version.id), arrival_of(lab, row.slug, params), mode)
 
 
 def check_robot(lab: Lab, slug: str, signature: str) -> None:
@@ -267,10 +277,10 @@ def check_robot(lab: Lab, slug: str, signature: str) -> None:
         raise BadInputError("X-Hatlab-Robot: signed for another study")
 
 
-def arrival_of(params: Mapping[str, str]) -> Arrival:
+def arrival_of(lab: Lab, slug: str, params: Mapping[str, str]) -> Arrival:
     """The marketplace's arrival; a direct one is named after its visit, which no marketplace names."""
-    arrival = recognition.recognise(params)
-    if arrival.external_id is not None or arrival.preview:
+    arrival = recognition.recognise(params, partial(personal.name_of, slug=slug, key=lab.secret_key))
+    if arrival.external_id is not None or arrival.preview or arrival.forged:
         return arrival
     visit = params.get(VISIT, "")
     return Arrival(arrival.marketplace, visit if is_visit(visit) else None)
@@ -301,12 +311,12 @@ def known_key(db: DbSession, lab: Lab, visit: Visit) -> str | None:
 
 
 def kind_of(db: DbSession, lab: Lab, visit: Visit) -> EntryKind:
+    if visit.arrival.forged:
+        return "not_invited"
     if (kept := refusal_of(db, lab, visit)) is not None:
         return kind_of_refusal(kept)
-    if visit.row.status == "paused":
-        return "paused"
-    if visit.row.status == "closed":
-        return "closed"
+    if visit.row.status in {"paused", "closed"}:
+        return "paused" if visit.row.status == "paused" else "closed"
     if visit.arrival.preview:
         return "preview"
     if not visit.study.agents <= lab.bundles.keys():

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from server.domain import canonical, reconciliation
 from server.domain.errors import HatlabError
 from server.domain.reconciliation import Mismatch, Ours, OverCapError, Theirs
+from server.domain.study import Pay
 from server.recruitment.recruiter import Bonus, Recruiter, RecruiterError, UncertainError
 from server.services import recruit
 from server.services.lab import Lab
 from server.services.pages import WON, bonus_minor
 from server.services.recruit import Place
-from server.services.recruiters import recruiter
+from server.services.recruiters import LISTS_EVERYBODY, recruiter
 from server.storage import postings, trials
 from server.storage.database import DbSession
 from server.storage.postings import PaymentRow
@@ -54,9 +55,18 @@ def look(db: DbSession, lab: Lab, posting_id: int) -> Found:
         Theirs(row.id, row.external_hash, row.state, row.code) for row in postings.submissions(db, posting_id)
     ]
     ours = people(db, place)
-    found = reconciliation.mismatches(ours, theirs, states, place.study.pay)
+    everybody = place.row.marketplace in LISTS_EVERYBODY
+    found = reconciliation.mismatches(ours, theirs, states, pay_at(place), lists_everybody=everybody)
     spent = sum(postings.spent(db, place.row.study_id).values())
     return Found(place, tuple(found), tuple(ledger), spent)
+
+
+def pay_at(place: Place) -> Pay | None:
+    """The study's pay as the marketplace pays it: MTurk has no screen-out, who handed in gets the reward."""
+    pay = place.study.pay
+    if pay is None or place.row.marketplace != "mturk":
+        return pay
+    return pay.model_copy(update={"screen_out_minor": pay.reward_minor})
 
 
 def kind_of(row: PaymentRow) -> reconciliation.ActionKind:

@@ -5,6 +5,7 @@ costs money. The network is never waited for inside a transaction.
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 from server.domain import canonical
@@ -157,12 +158,21 @@ def poll(lab: Lab, posting_id: int) -> int:
     with recruiter(lab, place.row.marketplace, place.study) as there:
         posted = asked(lambda: there.posted(place.row.external_id))
         found = asked(lambda: there.submissions(place.row.external_id))
+        for each in newcomers(lab, posting_id, found):
+            asked(partial(there.remember, place.row.external_id, each.external_id))
     with lab.database.writing() as db:
         postings.hold(db, posting_id)
         postings.told(db, posting_id, posted.state, posted.places)
         take_in(db, lab, place, found, "poll")
         postings.polled(db, posting_id, lab.now_utc())
     return len(found)
+
+
+def newcomers(lab: Lab, posting_id: int, told: Sequence[Submission]) -> list[Submission]:
+    """Those whom nothing was told of before."""
+    with lab.database.reading() as db:
+        known = {row.id for row in postings.submissions(db, posting_id)}
+    return [each for each in told if each.id not in known]
 
 
 def take_change(lab: Lab, marketplace: str, change: Change) -> bool:

@@ -1,23 +1,31 @@
 """Connections to marketplaces, by the settings; without an account there is a clear refusal."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
 from server.domain.errors import NotReadyError
 from server.domain.study import StudyDefinition
 from server.services.lab import Lab
 from server.settings import Settings
+from server.storage import postings
 
 if TYPE_CHECKING:
+    from server.recruitment.mturk_api import MTurkRecruiter
+    from server.recruitment.prolific_api import ProlificRecruiter
     from server.recruitment.recruiter import Recruiter
 
-NAMES = {"prolific": "Prolific"}
+NAMES = {"prolific": "Prolific", "mturk": "Mechanical Turk"}
+LISTS_EVERYBODY = frozenset({"prolific"})
+"""Marketplaces that tell of people who took a place and have not handed in yet."""
 
 
 def is_connected(settings: Settings, marketplace: str) -> bool:
     """Whether the settings name an account there."""
-    return marketplace == "prolific" and settings.prolific_token is not None
+    if marketplace == "prolific":
+        return settings.prolific_token is not None
+    keys = (settings.mturk_access_key_id, settings.mturk_secret_access_key)
+    return marketplace == "mturk" and None not in keys
 
 
 @contextmanager
@@ -27,21 +35,39 @@ def recruiter(lab: Lab, marketplace: str, study: StudyDefinition) -> Iterator["R
     Raises:
         NotReadyError: no account is set up.
     """
-    settings = lab.settings
-    if not is_connected(settings, marketplace):
+    if not is_connected(lab.settings, marketplace):
         raise NotReadyError(f"no account at {NAMES.get(marketplace, marketplace)}: see docs/settings.md")
+    opened = mturk(lab) if marketplace == "mturk" else prolific(lab.settings, study)
+    with closing(opened):
+        yield opened
+
+
+def prolific(settings: Settings, study: StudyDefinition) -> "ProlificRecruiter":
     from server.recruitment.prolific_api import ProlificRecruiter
     from server.recruitment.prolific_http import Connection
 
     assert settings.prolific_token is not None
-    connection = Connection(settings.prolific_api, settings.prolific_token)
-    pay = study.pay
-    opened = ProlificRecruiter(
-        connection,
-        screen_out_minor=pay.screen_out_minor if pay else None,
+    return ProlificRecruiter(
+        Connection(settings.prolific_api, settings.prolific_token),
+        screen_out_minor=study.pay.screen_out_minor if study.pay else None,
         settle_s=settings.prolific_settle_s,
     )
-    try:
-        yield opened
-    finally:
-        opened.close()
+
+
+def mturk(lab: Lab) -> "MTurkRecruiter":
+    """MTurk does not say who holds an assignment; our own rows do."""
+    from server.recruitment.mturk_api import MTurkRecruiter
+    from server.recruitment.mturk_client import MTurkClient
+
+    settings = lab.settings
+    assert settings.mturk_access_key_id is not None
+    assert settings.mturk_secret_access_key is not None
+    client = MTurkClient(
+        settings.mturk_endpoint, settings.mturk_access_key_id, settings.mturk_secret_access_key
+    )
+
+    def worker_of(submission_id: str) -> str | None:
+        with lab.database.reading() as db:
+            return postings.external_id_of_submission(db, "mturk", submission_id)
+
+    return MTurkRecruiter(client, settings.mturk_endpoint, worker_of)

@@ -52,6 +52,15 @@ class Sheet:
         return {"rows": self._rows, "bytes": self._bytes, "sha256": self._digest.hexdigest()}
 
 
+def plain(header: Sequence[str], rows: Iterable[Sequence[str]]) -> bytes:
+    """A small CSV file of texts that is in no codebook."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\r\n")
+    writer.writerow(header)
+    writer.writerows(safe(row, range(len(header))) for row in rows)
+    return text.getvalue().encode()
+
+
 def safe(row: Sequence[Any], guarded: Sequence[int]) -> Sequence[Any]:
     """Put `'` before the texts that a spreadsheet would run; numbers stay numbers.
 

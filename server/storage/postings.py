@@ -176,6 +176,14 @@ def external_id_of(db: DbSession, participant_id: str) -> str:
     return str(db.read(statement).scalar_one())
 
 
+def external_id_of_submission(db: DbSession, marketplace: str, submission_id: str) -> str | None:
+    """Who came in under a submission, by the marketplace's own name."""
+    statement = select(identity.c.external_id).where(
+        identity.c.marketplace == marketplace, identity.c.submission_id == submission_id
+    )
+    return db.read(statement.limit(1)).scalar_one_or_none()
+
+
 def participant_of_submission(
     db: DbSession, study_id: int, marketplace: str, submission_id: str
 ) -> str | None:

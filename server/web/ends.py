@@ -1,15 +1,16 @@
 """What is told at each end that somebody in a study can come to: where they stand, and what to do next."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 from server.domain.money import reward_minor, shown
 from server.domain.participation import State as Standing
 from server.domain.study import StudyDefinition
+from server.recruitment import mturk, prolific
 from server.recruitment.arrival import Arrival, ExitLink
 from server.recruitment.recognition import exit_link
 from server.services.pages import Page as State
-from server.web.pages import EndPage, Icon
+from server.web.pages import Action, EndPage, Icon
 
 
 class Told(NamedTuple):
@@ -46,10 +47,10 @@ DEVICES = {
 CONTACT = "If you think that this is a mistake, write to {contact}."
 
 
-def end_page(state: State) -> EndPage:
+def end_page(state: State, submit_hosts: Collection[str] = mturk.SUBMIT_HOSTS) -> EndPage:
     study, told = state.study, told_of(state)
     code = state.code or ""
-    link = link_of(state, code)
+    link = link_of(state, code, submit_hosts)
     through = state.state in {Standing.FINISHED, Standing.FAILED}
     return EndPage(
         title=study.title,
@@ -65,15 +66,30 @@ def end_page(state: State) -> EndPage:
         rounds=state.progress.rounds,
         paid=paid_of(state),
         goes_by_itself=through,
+        elsewhere=None if link else home(state.marketplace, state.parameters),
         language=study.texts.language,
         direction=study.texts.direction,
     )
 
 
-def link_of(state: State, code: str) -> ExitLink | None:
+def home(marketplace: str, parameters: Mapping[str, str]) -> Action | None:
+    """Where the person's work is listed on the site that sent them; none for who came by a direct link."""
+    if marketplace == "prolific":
+        return Action("Go to Prolific", prolific.HOME)
+    if marketplace == "mturk":
+        return Action("Go to Mechanical Turk", mturk.home(parameters))
+    return None
+
+
+def again(study: StudyDefinition) -> Action:
+    """For who declined and was not named: the page can be read again, and nothing was kept."""
+    return Action("Read about the study again", f"/s/{study.slug}")
+
+
+def link_of(state: State, code: str, submit_hosts: Collection[str]) -> ExitLink | None:
     if not code:
         return None
-    return exit_link(state.marketplace, code, state.parameters, state.study.completion_url)
+    return exit_link(state.marketplace, code, state.parameters, state.study.completion_url, submit_hosts)
 
 
 def told_of(state: State) -> Told:
@@ -115,12 +131,21 @@ def told_of(state: State) -> Told:
     return others[standing]
 
 
-def refused_page(study: StudyDefinition, status: str, arrival: Arrival, reason: str = "") -> EndPage:
+def refused_page(
+    study: StudyDefinition,
+    status: str,
+    arrival: Arrival,
+    reason: str = "",
+    submit_hosts: Collection[str] = mturk.SUBMIT_HOSTS,
+) -> EndPage:
     """The end of who declined, or whose device does not fit, before anything was begun."""
     declined = status == "declined"
     code = "" if declined else study.codes.screened_out
     named = arrival.external_id is not None
-    link = exit_link(arrival.marketplace, code, arrival.parameters, study.completion_url) if code else None
+    link = None
+    if code:
+        way = (arrival.marketplace, code, arrival.parameters, study.completion_url)
+        link = exit_link(*way, submit_hosts)
     back = WITH_CODE if code else BACK if named else "You may close this window."
     why = (study.texts.declined,) if declined else (DEVICES.get(reason, DEVICE), NO_REJECTION)
     return EndPage(
@@ -137,6 +162,7 @@ def refused_page(study: StudyDefinition, status: str, arrival: Arrival, reason: 
         rounds=0,
         paid=(),
         goes_by_itself=False,
+        elsewhere=None if link and named else home(arrival.marketplace, arrival.parameters) or again(study),
         language=study.texts.language,
         direction=study.texts.direction,
     )

@@ -14,8 +14,8 @@ from starlette.responses import RedirectResponse, Response
 from server.domain.errors import NotFoundError
 from server.domain.money import shown
 from server.domain.study import StudyDefinition
-from server.recruitment import mturk
-from server.recruitment.recognition import recognise
+from server.recruitment import mturk, personal
+from server.recruitment.recognition import marketplace_of, recognise
 from server.services import enrol
 from server.services.enrol import DeviceReport, Enrolled, Entry, Refused
 from server.services.lab import Lab
@@ -59,7 +59,7 @@ def entry_page(request: Request, lab: CurrentLab, slug: str, robot: Robot = None
             enrol.come_back(db, lab, found.key, params)
     if found.kind == "consent" and (key := remembered(request, lab, slug, params)):
         return RedirectResponse(f"/p/{key}", 303)
-    return page_of_entry(found, slug, params)
+    return page_of_entry(lab, found, slug, params)
 
 
 @router.post("/s/{slug}/consent")
@@ -81,8 +81,8 @@ def give_consent(
     if isinstance(done, Enrolled):
         return into_session(request, lab, slug, params, done.key)
     if isinstance(done, Refused):
-        return refused(done, params)
-    return consent_again(done, slug, params, TEXT_CHANGED)
+        return refused(lab, done, params)
+    return consent_again(lab, done, slug, params, TEXT_CHANGED)
 
 
 @router.post("/s/{slug}/screened")
@@ -99,19 +99,21 @@ def screened(request: Request, lab: CurrentLab, slug: str, fields: Fields, robot
     if isinstance(done, Enrolled):
         return into_session(request, lab, slug, params, done.key)
     if isinstance(done, Refused):
-        return refused(done, params)
-    return page_of_entry(done, slug, params)
+        return refused(lab, done, params)
+    return page_of_entry(lab, done, slug, params)
 
 
-def refused(done: Refused, params: Mapping[str, str]) -> Response:
+def refused(lab: Lab, done: Refused, params: Mapping[str, str]) -> Response:
     """What is told to who does not take part; what to hand in and the way back where there is one."""
-    page = ends.refused_page(done.study, done.status, recognise(params), params.get("reason", ""))
-    return html(page, frames=frames(params), forms=mturk.SUBMIT_HOSTS if frames(params) else ())
+    hosts = mturk.submit_hosts(lab.settings.mturk_extra_host)
+    arrival = recognise(params)
+    page = ends.refused_page(done.study, done.status, arrival, params.get("reason", ""), hosts)
+    return html(page, frames=frames(lab, params), forms=hosts if frames(lab, params) else ())
 
 
 def into_session(request: Request, lab: Lab, slug: str, params: Mapping[str, str], key: str) -> Response:
     response = RedirectResponse(f"/p/{key}", 303)
-    if recognise(params).marketplace == "direct":
+    if marketplace_of(params) == "direct":
         response.set_cookie(
             cookie_name(slug),
             key,
@@ -127,7 +129,7 @@ def into_session(request: Request, lab: Lab, slug: str, params: Mapping[str, str
 def remembered(request: Request, lab: Lab, slug: str, params: Mapping[str, str]) -> str | None:
     """The key of the session that this browser began by the direct link."""
     key = request.cookies.get(cookie_name(slug), "")
-    if not key or recognise(params).marketplace != "direct":
+    if not key or marketplace_of(params) != "direct":
         return None
     try:
         with lab.database.reading() as db:
@@ -141,30 +143,31 @@ def unticked(lab: Lab, slug: str, params: Mapping[str, str], robot: str | None) 
     """The consent page again, with what is missing."""
     with lab.database.reading() as db:
         found = enrol.entry(db, lab, slug, params, robot)
-    return consent_again(found, slug, params, TICK_FIRST)
+    return consent_again(lab, found, slug, params, TICK_FIRST)
 
 
-def consent_again(found: Entry, slug: str, params: Mapping[str, str], why: str) -> Response:
+def consent_again(lab: Lab, found: Entry, slug: str, params: Mapping[str, str], why: str) -> Response:
     """Say why consent is asked for once more, if it still is; the visit keeps its name."""
     if found.kind != "consent":
-        return page_of_entry(found, slug, params)
+        return page_of_entry(lab, found, slug, params)
     kept = {name: params.get(name, value) for name, value in found.identifiers.items()}
     kept[enrol.TEXT] = found.identifiers[enrol.TEXT]
-    return html(consent_page(found, slug, kept, why), 422, frames=frames(params))
+    return html(consent_page(found, slug, kept, why), 422, frames=frames(lab, params))
 
 
-def page_of_entry(found: Entry, slug: str, params: Mapping[str, str]) -> Response:
+def page_of_entry(lab: Lab, found: Entry, slug: str, params: Mapping[str, str]) -> Response:
     if found.key is not None:
         return RedirectResponse(f"/p/{found.key}", 303)
     if found.study is None:
         return html(messages.unknown_study(), 404)
     if found.kind == "consent":
         page = consent_page(found, slug, found.identifiers)
-        return html(page, frames=frames(params))
+        return html(page, frames=frames(lab, params))
     if found.kind in {"declined", "screened_out"}:
         status: enrol.Refusal = "declined" if found.kind == "declined" else "screened_out"
-        return refused(Refused(found.study, status), params)
-    return html(messages.of_entry(found.kind, found.study), frames=frames(params))
+        return refused(lab, Refused(found.study, status), params)
+    code = 403 if found.kind == "not_invited" else 200
+    return html(messages.of_entry(found.kind, found.study), code, frames=frames(lab, params))
 
 
 def consent_page(
@@ -211,14 +214,18 @@ def payment(study: StudyDefinition) -> str:
     return f"{reward}, and {rule}" if rule else reward
 
 
-def frames(params: Mapping[str, str]) -> tuple[str, ...]:
+def frames(lab: Lab, params: Mapping[str, str]) -> tuple[str, ...]:
     """Who may embed the page: MTurk its own workers'."""
-    return mturk.FRAME_HOSTS if recognise(params).marketplace == "mturk" else ()
+    return mturk.frame_hosts(lab.settings.mturk_extra_host) if marketplace_of(params) == "mturk" else ()
 
 
 def plain(values: Mapping[str, str]) -> dict[str, str]:
-    """The values that somebody can have typed or a marketplace sent."""
-    return {name: value for name, value in values.items() if PLAIN.fullmatch(value)}
+    """The values that somebody can have typed or a marketplace sent.
+
+    An invitation that is neither stays, but empty: without it, its sender would count as nobody's guest.
+    """
+    kept = {name: value for name, value in values.items() if PLAIN.fullmatch(value)}
+    return kept if personal.PARAMETER not in values else {personal.PARAMETER: "", **kept}
 
 
 def cookie_name(slug: str) -> str:

@@ -11,7 +11,7 @@ def of_entry(kind: EntryKind, study: StudyDefinition) -> MessagePage:
     """What is told to somebody whom the study cannot take."""
     if kind == "preview":
         return preview(study.title)
-    told = {"full": full, "paused": paused, "closed": closed}
+    told = {"full": full, "paused": paused, "closed": closed, "not_invited": not_invited}
     return told[kind](study.title, study.contact)
 
 
@@ -97,4 +97,17 @@ def closed(title: str, contact: str) -> MessagePage:
             CONTACT.format(contact=contact),
         ),
         "info",
+    )
+
+
+def not_invited(title: str, contact: str) -> MessagePage:
+    return MessagePage(
+        title,
+        "This invitation is not valid",
+        (
+            "The link is not one that this study sent out. It may have been cut off or changed on its way.",
+            "Open the link from your invitation again, or copy the whole of it into the address line.",
+            CONTACT.format(contact=contact),
+        ),
+        "warn",
     )

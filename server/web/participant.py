@@ -78,7 +78,7 @@ def hand_in(lab: CurrentLab, key: str, fields: Fields) -> Response:
         if state.form is None:
             return RedirectResponse(f"/p/{key}", 303)
         page = session_pages.form_page(lab, state, key, given, error.fields)
-        return html(page, 422, frames=frames_of(state))
+        return html(page, 422, frames=frames_of(lab, state))
     return RedirectResponse(f"/p/{key}", 303)
 
 
@@ -109,7 +109,7 @@ def ask_to_withdraw(lab: CurrentLab, key: str) -> Response:
         return html(messages.unknown_session(), 404)
     if state.kind == "end":
         return RedirectResponse(f"/p/{key}", 303)
-    return html(session_pages.withdraw_page(state, key), frames=frames_of(state))
+    return html(session_pages.withdraw_page(state, key), frames=frames_of(lab, state))
 
 
 @router.post("/p/{key}/withdraw")
@@ -126,16 +126,17 @@ def withdraw(lab: CurrentLab, key: str, fields: Fields) -> Response:
 
 def page_of_state(lab: Lab, state: State, key: str) -> Response:
     """The state as a page; MTurk's worker site may embed its own workers' pages."""
-    frames = frames_of(state)
+    frames = frames_of(lab, state)
     if state.kind == "instructions":
         return html(session_pages.instructions_page(state, key), frames=frames)
     if state.kind == "play":
         return html(session_pages.play_page(state, key), frames=frames)
     if state.kind == "form":
         return html(session_pages.form_page(lab, state, key, {}, {}), frames=frames)
-    forms = mturk.SUBMIT_HOSTS if state.marketplace == "mturk" else ()
-    return html(ends.end_page(state), frames=frames, forms=forms)
+    hosts = mturk.submit_hosts(lab.settings.mturk_extra_host)
+    forms = hosts if state.marketplace == "mturk" else ()
+    return html(ends.end_page(state, hosts), frames=frames, forms=forms)
 
 
-def frames_of(state: State) -> tuple[str, ...]:
-    return mturk.FRAME_HOSTS if state.marketplace == "mturk" else ()
+def frames_of(lab: Lab, state: State) -> tuple[str, ...]:
+    return mturk.frame_hosts(lab.settings.mturk_extra_host) if state.marketplace == "mturk" else ()

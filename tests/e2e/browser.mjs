@@ -2,7 +2,7 @@
 // A real Chromium and what a participant does in it. Used by play.mjs; the assertions are node's own.
 
 import assert from "node:assert/strict";
-import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { existsSync, mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { delimiter, join } from "node:path";
@@ -53,14 +53,19 @@ export class Participant {
    * @param {string} artefacts folder of the screenshots
    * @param {(participant: Participant) => Promise<void>} visit
    * @param {{ width: number, height: number }} [viewport]
+   * @param {import("playwright-core").BrowserContextOptions} [device]
+   * @param {object} [preferences] of the Chromium profile
    */
-  static async with(name, artefacts, visit, viewport = SIZES.large) {
+  static async with(name, artefacts, visit, viewport = SIZES.large, device = {}, preferences = {}) {
     const profile = mkdtempSync(join(tmpdir(), "hatlab-profile-"));
     mkdirSync(artefacts, { recursive: true });
+    mkdirSync(join(profile, "Default"));
+    writeFileSync(join(profile, "Default", "Preferences"), JSON.stringify(preferences));
     const context = await chromium.launchPersistentContext(profile, {
       executablePath: process.env.HATLAB_CHROMIUM ?? CHROMIUM ?? "chromium",
       args: FLAGS,
       viewport,
+      ...device,
     });
     const participant = new Participant(context, name, artefacts);
     try {
@@ -84,7 +89,10 @@ export class Participant {
     page.on("console", (message) => {
       const text = message.text();
       // A lost connection and a 409 are part of the tests; Chromium reports every failed request.
-      if (this.#looking) return; // taking a picture and checking it put styles into the page, which the policy refuses
+      // Taking a picture and checking it put styles into the page, which the policy refuses; on a busy machine that is
+      // told late. What the page's own files do has their address.
+      const ours = message.location().url !== "" || !/Content Security Policy/.test(text);
+      if (this.#looking || !ours) return;
       if (message.type() === "error" && !/Failed to load resource|net::ERR/.test(text)) this.errors.push(text);
     });
     page.on("response", (response) => {
@@ -132,17 +140,33 @@ export async function accessible(page, what) {
   assert.deepEqual(found, [], `accessibility of ${what}`);
 }
 
+/** Keys by the names that the entry page asks for. @type {Record<string, string>} */
+const KEYS = { up: "ArrowUp", brake: "f", go: "j" };
+
+/**
+ * The look at the device before consent: presses the keys that it asks for, and waits for the rest.
+ * @param {Place} page
+ */
+export async function passGate(page) {
+  const { keys } = JSON.parse(String(await page.locator("#gate").textContent()));
+  await page.locator("#check").waitFor();
+  for (const [first] of keys) await page.keyboard.press(KEYS[first] ?? "");
+  await page.locator("#fits").waitFor();
+}
+
 /** @typedef {{ task: string, role: string, phase: string, round: number, seq: number, step: number, over: object | null }} Shown */
+
+/** A page, or a frame with its page's keyboard. @typedef {Pick<Page, "locator" | "keyboard" | "waitForFunction">} Place */
 
 /**
  * What the strip says.
- * @param {Page} page
+ * @param {Place} page
  */
 export const strip = (page) => page.locator("#strip").textContent();
 
 /**
  * Waits until the round is over and its result can be left.
- * @param {Page} page
+ * @param {Place} page
  */
 export async function result(page) {
   await page.locator("#strip .button-primary").waitFor();
@@ -151,7 +175,7 @@ export async function result(page) {
 
 /**
  * The steps that the meter shows.
- * @param {Page} page
+ * @param {Place} page
  */
 export async function steps(page) {
   return Number(await page.locator(".meter .value b").first().textContent());
@@ -159,7 +183,7 @@ export async function steps(page) {
 
 /**
  * One key press, and the wait for what follows: another step on the meter, or the end of the round.
- * @param {Page} page
+ * @param {Place} page
  * @param {string} key
  */
 export async function press(page, key) {
@@ -174,7 +198,7 @@ export async function press(page, key) {
 
 /**
  * Whether the round still takes decisions.
- * @param {Page} page
+ * @param {Place} page
  */
 export async function playing(page) {
   await page.locator(".key[aria-disabled=false], #strip .button-primary").first().waitFor();

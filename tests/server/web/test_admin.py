@@ -34,7 +34,7 @@ PAGES = [
 EVERY_METHOD = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS")
 LOGIN = "/admin/login"
 # Everybody may ask for these, with what the address itself proves (a key) or no secret at all.
-FOR_PARTICIPANTS = ("/s/{slug}", "/p/{key}", "/healthz")
+FOR_PARTICIPANTS = ("/hooks/", "/s/{slug}", "/p/{key}", "/healthz")
 ROUTES = sorted(
     (method, str(route.path))
     for route in iter_route_contexts(admin.router.routes)
