@@ -1,16 +1,18 @@
 // @ts-check
-// Joins the window's events to its log. Batches go every few seconds, and when the page is left.
+// Joins the window's events to its log. Batches go soon after loading, every few seconds, and when the page is left.
 
 import { visitName, WindowLog } from "./windowlog.js";
 
 /** @import { Batch, Kind } from "./windowlog.js" */
 
+const SOON_MS = 500;
 const EVERY_MS = 5000;
 const SETTLED_MS = 300; // a window that is being dragged has many sizes; the one it keeps counts
 
 /**
  * @param {{ events_url: string, page: string }} where
  * @param {Window} [view]
+ * @returns {WindowLog} to be flushed where the session may end: after the end the server keeps nothing
  */
 export function watchWindow({ events_url, page }, view = window) {
   const log = new WindowLog({
@@ -22,7 +24,9 @@ export function watchWindow({ events_url, page }, view = window) {
   const size = () => `${view.innerWidth}x${view.innerHeight}`;
   log.note("loaded", size());
   listen(view, log, size);
+  setTimeout(() => void log.flush(), SOON_MS);
   setInterval(() => void log.flush(), EVERY_MS);
+  return log;
 }
 
 /**

@@ -60,15 +60,18 @@ function head({ phase, number, of }) {
 
 const bar = startBar();
 const winnings = new Winnings(data.won);
-watchWindow(data);
+const windowLog = watchWindow(data);
 
 /**
- * The bar, once a round has ended: after the picture, so that nothing delays it.
+ * The bar and the window's log, once a round has ended: after the picture, so that nothing delays it.
  * @param {RoundView} now
  */
-function tellBar(now) {
+function ended(now) {
   const left = data.rounds * data.blocks - roundsOver(now, data.rounds);
-  setTimeout(() => bar.tell(left, data.bonuses[winnings.count(now)]));
+  setTimeout(() => {
+    bar.tell(left, data.bonuses[winnings.count(now)]);
+    void windowLog.flush();
+  });
 }
 
 /** Connection lost: the board dims, the keys are flat, the strip counts down to the next try. */
@@ -130,7 +133,7 @@ watchViewport(window, (small) => {
 async function decide(action, timing, about) {
   const next = await session.decide(about, action, timing);
   view = next;
-  if (next?.over) tellBar(next);
+  if (next?.over) ended(next);
   return next;
 }
 
