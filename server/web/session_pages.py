@@ -69,6 +69,7 @@ def play_page(state: State, key: str) -> PlayPage:
     data = {
         **addresses,
         "events_url": f"/p/{key}/events",
+        "page": state.name,
         "task": study.task,
         "role": state.role,
         "block": state.block,

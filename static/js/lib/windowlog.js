@@ -50,7 +50,8 @@ export class WindowLog {
   /** The page is being left, or may be: everything goes now, also what is on its way and may not arrive. */
   async leave() {
     const batches = [];
-    for (let from = 0; from < this.#waiting.length; from += BATCH) batches.push(this.#waiting.slice(from, from + BATCH));
+    for (let from = 0; from < this.#waiting.length; from += BATCH)
+      batches.push(this.#waiting.slice(from, from + BATCH));
     await Promise.all(batches.map(async (batch) => (await this.#try(batch, true)) && this.#drop(batch)));
   }
 

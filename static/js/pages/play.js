@@ -6,19 +6,22 @@ import { build } from "../board/drawing.js";
 import { pips } from "../board/meters.js";
 import { Attention } from "../lib/attention.js";
 import { el, find } from "../lib/dom.js";
+import { FullScreen } from "../lib/fullscreen.js";
 import { Outbox, pageStorage } from "../lib/outbox.js";
 import { Session } from "../lib/session.js";
+import { tabStorage } from "../lib/storage.js";
 import { sayIn, setAside } from "../lib/strip.js";
 import { openChannel, takeTurn } from "../lib/tabs.js";
 import { Transport } from "../lib/transport.js";
 import { watchViewport } from "../lib/viewport.js";
+import { watchWindow } from "../lib/watch.js";
 import { NOTICES } from "../lib/words.js";
 import { ParentChildPlugin } from "../plugins/parent-child.js";
 import { TrafficJunctionPlugin } from "../plugins/traffic-junction.js";
 
 /** @import { Brought, Message, RoundView, Timing } from "../lib/types.js" */
 
-/** @type {{ round_url: string, step_url: string, page_url: string }} */
+/** @type {{ round_url: string, step_url: string, page_url: string, events_url: string, page: string }} */
 const urls = JSON.parse(find("#page-data").textContent ?? "{}");
 const strip = find("#strip");
 const attention = new Attention().watch(document);
@@ -52,6 +55,9 @@ function head({ phase, number, of }) {
   else far.replaceChildren("Round ", el("b", {}, String(number)), ` of ${of}`);
   find("#pips").replaceChildren(...(phase === "practice" ? [] : [build(pips(number, of))]));
 }
+
+const fullScreen = new FullScreen(document, tabStorage());
+watchWindow(urls.events_url, urls.page);
 
 /** Connection lost: the board dims, the keys are flat, the strip counts down to the next try. */
 transport.addEventListener("lost", (event) => {
@@ -120,6 +126,7 @@ async function decide(action, timing, about) {
  * @param {RoundView} finished
  */
 async function proceed(finished) {
+  void fullScreen.renew();
   view = await session.open(finished.round);
 }
 
