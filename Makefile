@@ -63,8 +63,9 @@ torture: $(DEV) ## kill -9 the server under robots, and under a whole study with
 screenshots: $(RUNTIME) $(NODE) ## take the pictures of README and docs again (needs Node 20 and Chromium)
 	node tests/e2e/screenshots.mjs docs/images
 
-docs: $(DEV) ## write the generated documents again (data dictionary, released agents)
+docs: $(DEV) ## write the generated documents again (data dictionary, journey, released agents)
 	$(BIN)/python -m server.services.codebook > docs/data-dictionary.md
+	$(BIN)/python -m server.web.journey_map > docs/journey.md
 	$(BIN)/python -m models.roster > docs/released-agents.md
 
 figures: $(RUNTIME) ## draw the paper's figures again from the released agents (a few minutes)

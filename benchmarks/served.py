@@ -24,6 +24,7 @@ from itsdangerous import TimestampSigner
 from pydantic import SecretStr
 
 from benchmarks import untrained
+from benchmarks.rounds_only import ROUNDS_ONLY
 from models.policies import bundle
 from server.domain.study import read
 from server.services import studies
@@ -117,7 +118,7 @@ class Served:
     def add_study(self, template: str, *, places: int, mode: str = "test", **changes: Any) -> str:
         """Launch a study made from a template, with room for many; give its slug."""
         slug = f"{template}-measured"
-        values = {**studies.template(template), "slug": slug, **changes}
+        values = {**studies.template(template), **ROUNDS_ONLY, "slug": slug, **changes}
         values["arms"] = [{**arm, "places": places} for arm in values["arms"]]
         definition = read(values)
         with self.lab() as lab, lab.database.writing() as db:

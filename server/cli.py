@@ -1,4 +1,4 @@
-"""The command line: `hatlab init | serve | verify | export | invite | …`, and the commands of models.cli.
+"""The command line: `hatlab init | serve | verify | export | …`, and the commands of models.cli.
 
 Exit code 0: done; 1: the check failed; 2: bad input, said in one line on stderr. What is slow to import is
 imported by the command that needs it; `hatlab serve` never loads training.
@@ -142,6 +142,42 @@ def export(
     manifest = write(lab, study, mode or (), out, practice=practice)
     for name, facts in manifest["files"].items():
         typer.echo(f"{facts['rows']:>9} rows  {out / name}")
+
+
+@app.command()
+def erase(
+    study: Slug,
+    participant: Annotated[
+        str, typer.Option(metavar="P…", help="The person's code, as in exports and on the monitor.")
+    ] = "",
+    marketplace: Annotated[str, typer.Option(help="prolific or mturk; with --external-id.")] = "",
+    external_id: Annotated[
+        str, typer.Option(help="What the marketplace calls the person; also finds who declined.")
+    ] = "",
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before deleting.")] = False,
+) -> None:
+    """Delete everything that is known of one person in a study, for good. Asks first."""
+    from server.services import erase as erasing
+    from server.services.lab import Lab
+
+    if bool(participant) == bool(external_id) or bool(marketplace) != bool(external_id):
+        raise BadInputError("name one person: --participant P…, or --marketplace M with --external-id ID")
+    lab = Lab.without_agents(settings_of_environment())
+    with lab.database.reading() as db:
+        if participant:
+            who = erasing.find_participant(db, lab, study, participant)
+        else:
+            who = erasing.find_external(db, lab, study, marketplace, external_id)
+    typer.echo(who.text)
+    if who.is_owed:
+        typer.echo("No payment to this person is known here. Pay them first: nobody can afterwards.")
+    if not yes and not typer.confirm("Delete all of this for good?"):
+        typer.echo("nothing was deleted")
+        raise typer.Exit(1)
+    with lab.database.writing() as db:
+        erasing.erase(db, who)
+    lab.database.settle()
+    typer.echo("deleted; copies in backups and in earlier exports are not")
 
 
 @app.command()

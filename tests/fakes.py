@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from sqlalchemy.event import listen
 
+from benchmarks.rounds_only import ROUNDS_ONLY
 from models.envs import registry
 from models.policies.api import RandomDraws, Speech
 from models.policies.bundle import Manifest, PolicyBundle
@@ -130,11 +131,24 @@ def another_worker(lab: Lab, cache: int = 64) -> Lab:
     return replace(lab, cache=Recent(cache), definitions=Recent(8))
 
 
-def definition(slug: str, **changes: Any) -> study.StudyDefinition:
-    """A packaged study, with some fields changed; short by default."""
+def definition(slug: str, *, whole: bool = False, **changes: Any) -> study.StudyDefinition:
+    """A packaged study, with some fields changed; short by default.
+
+    Without `whole` it has instructions and rounds, and nothing else. With it, its attention checks come at
+    even distances.
+    """
     values = tomllib.loads((STUDIES / f"{slug}.toml").read_text())
-    values |= {"trials_per_block": 3} | changes
-    return study.read(values)
+    values |= {"trials_per_block": 3} | ({} if whole else ROUNDS_ONLY) | changes
+    return study.read(with_checks_in_reach(values) if "attention" not in changes else values)
+
+
+def with_checks_in_reach(values: dict[str, Any]) -> dict[str, Any]:
+    """The values of a shortened study whose attention checks still come before its last round."""
+    rounds = values["trials_per_block"] * (2 if values["task"] == "parent_child" else 1)
+    checks = values["attention"]
+    gaps = len(checks) + 1
+    spread = [check | {"after": -(-rounds * number // gaps)} for number, check in enumerate(checks, start=1)]
+    return values | {"attention": spread}
 
 
 def timing(rt_ms: float = 412.5, **changes: Any) -> Mapping[str, Any]:

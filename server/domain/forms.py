@@ -68,6 +68,25 @@ def right_answers(study: StudyDefinition, name: str, role: Role) -> dict[str, Qu
     return {}
 
 
+def items_of(study: StudyDefinition, name: str) -> dict[str, Item]:
+    """The questions of a form by key, of every role; the marks of a probe are no questions."""
+    kind, _, _ = name.partition(":")
+    asked: tuple[Item, ...] = ()
+    if kind == "quiz":
+        asked = study.quiz
+    elif kind == "attention":
+        asked = study.attention
+    else:
+        asked = next((each.items for each in study.questionnaires if each.key == kind), ())
+    return {item.key: item for item in asked}
+
+
+def block_of(study: StudyDefinition, name: str) -> int:
+    """The block in which a form comes; 0: after all blocks."""
+    kind, _, number = name.partition(":")
+    return (int(number) - 1) // study.trials_per_block + 1 if kind == "attention" else int(number)
+
+
 def check_due(study: StudyDefinition, rounds_over: int, answered: Sequence[str]) -> AttentionCheck | None:
     """The attention check that comes next, if one is due."""
     due = sorted((c for c in study.attention if c.after <= rounds_over), key=lambda check: check.after)

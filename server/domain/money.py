@@ -1,6 +1,11 @@
-"""Money: whole minor units (pence, cents) everywhere; here is how people read them."""
+"""Money: whole minor units (pence, cents) everywhere; what an end is worth, and how people read it."""
+
+from server.domain.participation import State
+from server.domain.study import Pay
 
 SIGNS = {"GBP": "£", "USD": "$", "EUR": "€"}
+WENT_THROUGH = frozenset({State.FINISHED, State.FAILED})
+"""Ends of who gets the whole reward and a bonus, attentive or not."""
 
 
 def shown(minor: int, currency: str) -> str:
@@ -10,3 +15,17 @@ def shown(minor: int, currency: str) -> str:
     '£1.50'
     """
     return f"{SIGNS.get(currency, currency + ' ')}{minor // 100}.{minor % 100:02d}"
+
+
+def reward_minor(pay: Pay, status: str) -> int:
+    """What somebody of this status is paid for their time, by the study's rule."""
+    if status in WENT_THROUGH:
+        return pay.reward_minor
+    return {State.WITHDRAWN.value: pay.partial_minor, State.SCREENED_OUT.value: pay.screen_out_minor}.get(
+        status, 0
+    )
+
+
+def bonus_minor(pay: Pay, status: str, won: int) -> int:
+    """What so many successes are worth to somebody of this status."""
+    return min(won * pay.bonus_success_minor, pay.bonus_max_minor) if status in WENT_THROUGH else 0

@@ -13,6 +13,13 @@ NO_ASSIGNMENT = "ASSIGNMENT_ID_NOT_AVAILABLE"
 SUBMIT_HOSTS = ("https://www.mturk.com", "https://workersandbox.mturk.com")  # anything else: open redirect
 FRAME_HOSTS = ("https://worker.mturk.com", *SUBMIT_HOSTS)
 
+HOME, SANDBOX_HOME = "https://worker.mturk.com", "https://workersandbox.mturk.com"
+
+
+def home(parameters: Mapping[str, str]) -> str:
+    """The worker site that the link came from; workers of the sandbox go back to the sandbox."""
+    return SANDBOX_HOME if parameters.get("turkSubmitTo", "").startswith(SANDBOX_HOME) else HOME
+
 
 def frame_hosts(extra: str = "") -> tuple[str, ...]:
     """Who may embed a worker's pages; `extra` is the setting `mturk_extra_host`."""

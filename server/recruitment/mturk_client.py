@@ -130,7 +130,7 @@ def connect(endpoint: str, secret_access_key: str, access_key_id: str, attempts:
         aws_access_key_id=access_key_id,
         aws_secret_access_key=secret_access_key,
         config=Config(
-            retries={"mode": "standard", "max_attempts": attempts},
+            retries={"mode": "standard", "total_max_attempts": attempts},
             connect_timeout=CONNECT_S,
             read_timeout=READ_S,
         ),

@@ -9,6 +9,8 @@ from urllib.parse import urlencode
 from server.recruitment.arrival import Arrival, ExitLink
 
 PARAMETERS = ("PROLIFIC_PID", "STUDY_ID", "SESSION_ID")
+HOME = "https://app.prolific.com/submissions"
+"""Where people see their own submissions."""
 COMPLETE = "https://app.prolific.com/submissions/complete"
 PLACEHOLDER = "{{%"
 PLACEHOLDERS = "PROLIFIC_PID={{%PROLIFIC_PID%}}&STUDY_ID={{%STUDY_ID%}}&SESSION_ID={{%SESSION_ID%}}"

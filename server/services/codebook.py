@@ -62,9 +62,23 @@ consent_text_sha256 | string | | Hash of the consent text that was agreed to.
 consented_utc | utc | UTC | When consent was stored.
 last_seen_utc | utc | UTC | When the server last heard from this participant.
 finished_utc | utc | UTC | When the last page was reached; empty if it was not.
-status | string | | active, finished, or abandoned: not heard of for longer than the study's lease.
-page | string | | Page of the flow on which the participant is.
+status | string | | active; abandoned: not heard of for longer than the study's lease; or the end that was
+  come to: finished, failed (too many attention checks), screened_out (by the quiz), withdrawn, timed_out,
+  returned, rejected (by the marketplace).
+page | string | | Page of the flow on which the participant is, or was at the end.
 completion_code | string | | Code that the participant was shown at the end.
+attention_failed | integer | checks | Attention checks with a wrong answer; empty if erased.
+excluded | boolean | | false for who is analysed: finished, by the study's rule. The rule was frozen with the
+  version.
+exclusion_reason | string | | Exactly one for everybody who is excluded: incomplete (still taking part, or
+  abandoned), quiz, attention, withdrawn, timed_out, returned or rejected.
+won | integer | rounds | Main rounds that were won: found or arrived; empty if erased.
+bonus_minor | integer | pence or cents | Bonus that the study's rule gives for them; 0 for who did not go
+  through everything; empty where the study states no pay.
+currency | string | | Currency of the amounts: GBP, USD or EUR.
+reward_minor | integer | pence or cents | Reward that the study's rule gives for this end; empty where the
+  study states no pay.
+erased | boolean | | true if the person asked for deletion: no other table but flow.csv counts them.
 """),
 )
 
@@ -92,8 +106,8 @@ scripted | string | | Scripted teammate (practice); empty with a trained policy.
 seed | integer | | Seed of the situation: the world replays from it.
 started_utc | utc | UTC | When the server stored event 0.
 ended_utc | utc | UTC | When the server stored the last event; empty while unfinished.
-outcome | string | | found or not_found (Parent & Lost Child); arrived, collision or limit (Traffic
-  Junction); abandoned: left unfinished. Empty while it is being played.
+outcome | string | | found or not_found (Parent & Lost Child); arrived, collision or limit (Traffic Junction);
+  abandoned: left unfinished. Empty while it is being played.
 success | boolean | | true if outcome is found or arrived; empty while it is being played.
 steps | integer | steps | Steps of the parent, 20 if not found (parent and child role); own decisions
   (driver).
@@ -118,8 +132,8 @@ trial_id | string | | Key of the trial in trials.csv.
 seq | integer | | Decision within the trial, from 1. What was shown before it was stored with event seq - 1.
 phase | string | | practice or main.
 role | string | | parent, child or driver.
-action | integer | | Parent: 0 up, 1 right, 2 down, 3 left. Child: token_shown, the number of the chosen
-  sign. Driver: 0 go, 1 brake.
+action | integer | | Parent: 0 up, 1 right, 2 down, 3 left. Child: token_shown, the number of the chosen sign.
+  Driver: 0 go, 1 brake.
 action_name | string | | The same as a word: up, right, down, left; sign; go, brake.
 rt_ms | number | ms | Reaction time: response_ms - onset_ms. Holds no network time.
 rt_valid | boolean | | true if the page was never hidden, not resumed after a reload, and rt_ms ≥ 0.
@@ -154,9 +168,77 @@ source | string | | Who spoke for this seat: policy, scripted, human (child role
 cell | integer | cells | Cell before the action: row x columns + column; from 0.
 token | integer | | Token (index in the bundle) said in that state; empty if the seat said nothing.
 gate | boolean | | true if the message was sent.
-action | integer | | Action taken then. Parent & Lost Child: 0 up, 1 right, 2 down, 3 left, 4 stay; Traffic:
-  0 go, 1 brake.
+action | integer | | Action taken then. Parent & Lost Child: 0 up, 1 right, 2 down, 3 left, 4 stay; Traffic: 0
+  go, 1 brake.
 cell_next | integer | cells | Cell after the action; empty if the car has left.
+""")
+
+ANSWERS = (
+    *_STUDY,
+    *_columns("""
+arm | string | | Arm that the participant was allocated to.
+form | string | | quiz, attention, probe, or the key of a questionnaire.
+block | integer | | Block in or after which it was asked, from 1; 0: after all blocks.
+attempt | integer | | Which try this was, from 1; only a quiz has more than one.
+item | string | | Key of the question within its form.
+value | string | | The answer: the option's number (from 1), the value of a scale or a number, or what was
+  written; of the probe row,column of the marked cell. Empty if an optional question was left out.
+label | string | | The words of the chosen option; empty where nothing was chosen from a list.
+correct | boolean | | Whether the answer was right; empty where no answer is right or wrong.
+first_ms | number | ms | From the drawing of the form to the first change of this answer; empty if not
+  measured.
+last_ms | number | ms | From the drawing of the form to the last change of this answer.
+changes | integer | changes | How often the answer was changed, the first time included.
+answered_utc | utc | UTC | When the server stored the form.
+"""),
+)
+
+PROBE = _columns("""
+participant | string | | Pseudonym of the person within hatlab.
+arm | string | | Arm that the participant was allocated to.
+communication | string | | What the teammates' messages are: prototype, one-hot or shuffled.
+sign | integer | | Number on screen of the sign that was marked for; from 1.
+position | integer | | Panel position at which that sign stood; from 0.
+token | integer | | Token (index in the bundle) behind the sign; from 0.
+row | integer | cells | Marked cell: row from the top; from 0.
+column | integer | cells | Marked cell: column from the left; from 0.
+probability | number | probability | P(cell given token) of the marked cell, by the lexicon of the arm's
+  agent. This and the three that follow are empty if that agent was not loaded at the export.
+best | number | probability | The largest P(cell given token): what the best mark would have got.
+distance | number | steps | Expected steps (up, down, left, right) from the marked cell to where the token is
+  said.
+least | number | steps | The same from the best cell that could have been marked.
+""")
+
+BROWSER_EVENTS = _columns("""
+participant | string | | Pseudonym of the person within hatlab.
+visit | string | | Name that a page draws when it is loaded: events of one load belong together.
+seq | integer | | Event within the visit.
+page | string | | Page of the flow on which it happened.
+kind | string | | loaded; focus, blur; visible, hidden; resize; fullscreen, windowed: what happened to the
+  window.
+value | string | | What goes with it, such as the size after resize.
+at_ms | number | ms | Page clock when it happened: since the page was loaded.
+stored_utc | utc | UTC | When the server stored it.
+""")
+
+JOURNEY = _columns("""
+participant | string | | Pseudonym of the person within hatlab.
+seq | integer | | Event within the person's journey, from 1.
+event | string | | What happened, as docs/journey.md names it.
+state | string | | State of the person after it, likewise.
+source | string | | Who said so: participant, server, or the marketplace.
+stored_utc | utc | UTC | When the server stored it.
+""")
+
+FLOW = _columns("""
+study | string | | Short name of the study, as in its link.
+mode | string | | live, test, preview or robot.
+arm | string | | Arm that is counted; empty: the whole study. Only what follows consent is counted by arm.
+stage | string | | invited, declined, screened_out (device), consented, quiz_failed, withdrawn, timed_out,
+  returned, rejected, abandoned, in_progress, finished, attention_failed, analysed. consented is the sum of
+  the stages from quiz_failed to finished; finished is attention_failed and analysed together.
+people | integer | people | How many. Empty: unknown, as it is for invited.
 """)
 
 CODEBOOK = _columns("""
@@ -172,18 +254,33 @@ TABLES: dict[str, tuple[Column, ...]] = {
     "trials": TRIALS,
     "steps": STEPS,
     "agents": AGENTS,
+    "answers": ANSWERS,
+    "probe": PROBE,
+    "browser_events": BROWSER_EVENTS,
+    "journey": JOURNEY,
+    "flow": FLOW,
 }
 TABLE_KEYS = {
     "participants": "participant",
     "trials": "trial_id; participant joins participants.csv",
     "steps": "trial_id, seq; trial_id joins trials.csv",
     "agents": "trial_id, seq, step, seat; trial_id, seq join steps.csv",
+    "answers": "participant, form, block, attempt, item; participant joins participants.csv",
+    "probe": "participant, sign; participant joins participants.csv",
+    "browser_events": "participant, visit, seq; participant joins participants.csv",
+    "journey": "participant, seq; participant joins participants.csv",
+    "flow": "mode, arm, stage",
 }
 TABLE_MEANINGS = {
     "participants": "One row a person who consented.",
     "trials": "One row a trial that was begun.",
     "steps": "One row a decision of the participant.",
     "agents": "One row a seat and world step, the participant's seat included.",
+    "answers": "One row an answer: to quiz, attention checks, questionnaires, and the probe of the signs.",
+    "probe": "One row a sign that was marked in the probe: where the person thinks that it points.",
+    "browser_events": "One row an event of the participant's window.",
+    "journey": "One row a thing that moved a participant from one state to another.",
+    "flow": "One row a stage of the study's flow, as a CONSORT diagram counts it.",
 }
 
 
@@ -203,16 +300,18 @@ _PREFACE = """# Data dictionary
 
 This page is printed by `python -m server.services.codebook`, the module from which the export takes its
 headers. An export holds these tables as CSV, `codebook.csv` (this page as a table) and `manifest.json` (row
-counts, SHA-256 of every file, study versions, modes, time of the export).
+counts, SHA-256 of every file, study versions, modes, flow, agents that were not loaded, time of the export).
 
 - RFC 4180: UTF-8, CRLF, header line. An empty cell means: does not exist here. Booleans: `true` and `false`.
 - A text that starts with `=`, `+`, `-`, `@`, TAB or CR is preceded by `'`, so that a spreadsheet does not run
   it. Numbers stay numbers.
 - Times are UTC, ISO 8601 with milliseconds. Cells, rows, columns, seats, tokens and positions count from 0;
   trials, blocks, rounds, steps, decisions and numbers on screen from 1.
+- Amounts of money are whole minor units: pence or cents.
 - Worker ids of a marketplace are never exported: a person appears only as the pseudonym in `participant`.
 - Rows of the modes test, preview and robot, and practice trials, are left out unless asked for
   (`hatlab export STUDY --out DIR --mode robot --practice`).
+- Whoever asked for deletion has a row in participants.csv (`erased` is true), and nowhere else.
 - All tables of one export are read in one transaction, and rows are ordered by their key.
 """
 

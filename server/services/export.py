@@ -9,7 +9,7 @@ an export without one was interrupted. What the columns mean stands in `server.s
 import io
 import json
 import zipfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
@@ -17,19 +17,27 @@ from importlib.metadata import version
 from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from pydantic_core import from_json  # reads the same values as json, in half the time
 
 from server.domain import canonical
 from server.domain.errors import BadInputError, NotFoundError
 from server.domain.plan import has_left
+from server.domain.study import StudyDefinition
 from server.domain.study import from_json as definition_of
-from server.services import codebook, tidy, tracks
+from server.services import codebook, flow, probe, tidy, tidy_answers, tracks
 from server.services.lab import Lab
 from server.services.sheets import Sheet
 from server.storage import exports
+from server.storage.answers import AnswerRow
+from server.storage.browser_log import BrowserEventRow
 from server.storage.database import DbSession
+from server.storage.journeys import JourneyRow
+
+if TYPE_CHECKING:
+    from models.policies.bundle import PolicyBundle
+    from models.policies.lexicon import Lexicon
 
 Mode = Literal["live", "test", "preview", "robot"]
 MODES: tuple[Mode, ...] = get_args(Mode)
@@ -52,19 +60,60 @@ class Choice:
 
 
 class _Page:
-    """Some people with their trials; `left` holds those who were not heard of for longer than the lease."""
+    """Some people, and what belongs to them, read when a table asks for it.
+
+    `left` holds those who were not heard of for longer than the lease. Of whoever had the data erased nothing
+    is read but the person.
+    """
 
     def __init__(
-        self, people: Sequence[tidy.Row], left: frozenset[str], stories: Iterator[tidy.Story]
+        self,
+        db: DbSession,
+        people: Sequence[tidy.Row],
+        left: frozenset[str],
+        phases: Sequence[str],
+        definitions: Mapping[int, StudyDefinition],
+        bundles: "Mapping[str, PolicyBundle]",
     ) -> None:
         self.people = {person["id"]: person for person in people}
         self.left = left
-        self._stories = stories
+        self.known = [person["id"] for person in people if person["erased_utc"] is None]
+        self._db, self._phases = db, phases
+        self._definitions, self._bundles = definitions, bundles
+
+    def definition(self, person: tidy.Row) -> StudyDefinition:
+        return self._definitions[person["study_version"]]
+
+    def lexicon(self, person: tidy.Row) -> "Lexicon | None":
+        """What the agent's tokens mean with whom this person played; None: it is not loaded."""
+        bundle = self._bundles.get(self.definition(person).arm(person["arm"]).bundle)
+        return bundle.lexicon if bundle else None
 
     @cached_property
     def stories(self) -> tuple[tidy.Story, ...]:
-        """The trials, read when a table asks for them."""
-        return tuple(self._stories)
+        return tuple(_stories(self._db, self.known, self._phases))
+
+    @cached_property
+    def answers(self) -> Mapping[str, Sequence[AnswerRow]]:
+        """By person."""
+        return tidy_answers.by_person(exports.answer_rows(self._db, self.known))
+
+    def tallies(self) -> Iterator[tuple[tidy.Row, tidy.Tally]]:
+        """Everybody, with what is counted of them."""
+        won = exports.won(self._db, self.known, tidy.GOOD_OUTCOMES)
+        failed = exports.attention_failed(self._db, self.known)
+        for key, person in self.people.items():
+            erased = person["erased_utc"] is not None
+            yield (
+                person,
+                tidy.Tally(None, None) if erased else tidy.Tally(won.get(key, 0), failed.get(key, 0)),
+            )
+
+    def browser_events(self) -> Iterator[BrowserEventRow]:
+        return exports.browser_event_rows(self._db, self.known)
+
+    def journeys(self) -> Sequence[JourneyRow]:
+        return exports.journey_rows(self._db, self.known)
 
 
 def export(
@@ -80,14 +129,13 @@ def export(
         choice = choose(db, slug, modes, practice=practice)
         _prepare(out_dir)
         source = _Source(db, lab, choice)
-        sheets = [Sheet(table) for table in (*_BUILDERS, "codebook")]
+        sheets = [Sheet(table) for table in (*_BUILDERS, *_WHOLE)]
         files = [stack.enter_context((out_dir / sheet.name).open("wb")) for sheet in sheets]
         for page in source.pages():
             for sheet, file, build in zip(sheets, files, _BUILDERS.values(), strict=False):
                 file.writelines(sheet.pieces(build(slug, page)))
-        files[-1].writelines(sheets[-1].pieces(codebook.rows()))
         for sheet, file in zip(sheets, files, strict=True):
-            file.writelines(sheet.pieces())
+            file.writelines(sheet.pieces(source.rows(sheet.table)))
         manifest = source.manifest(sheets)
         (out_dir / MANIFEST).write_bytes(_text(manifest))
     return manifest
@@ -138,7 +186,7 @@ def _zipped(lab: Lab, choice: Choice) -> Iterator[bytes]:
         zipfile.ZipFile(sink, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive,
     ):
         source = _Source(db, lab, choice)
-        sheets = [Sheet(table) for table in (*_BUILDERS, "codebook")]
+        sheets = [Sheet(table) for table in (*_BUILDERS, *_WHOLE)]
         for sheet in sheets:
             with archive.open(source.entry(sheet.name), "w", force_zip64=True) as file:
                 for piece in source.pieces(sheet):
@@ -178,12 +226,15 @@ class _Source:
     def __init__(self, db: DbSession, lab: Lab, choice: Choice) -> None:
         self._db = db
         self._choice = choice
+        self._bundles = lab.bundles
         self._moment = lab.now()
         self._versions = exports.version_rows(db, choice.study_id)
+        self._definitions = {row["number"]: definition_of(row["definition"]) for row in self._versions}
         self._lease_began = {
-            row["number"]: canonical.minutes_before(self._moment, definition_of(row["definition"]).lease_min)
-            for row in self._versions
+            number: canonical.minutes_before(self._moment, definition.lease_min)
+            for number, definition in self._definitions.items()
         }
+        self._flows = flow.flows(db, choice.study_id, self._moment, choice.modes)
 
     def pages(self) -> Iterator[_Page]:
         """Everybody, a page at a time, by id."""
@@ -191,27 +242,34 @@ class _Source:
         while people := exports.participant_page(db, choice.study_id, choice.modes, after, PEOPLE_A_PAGE):
             after = people[-1]["id"]
             left = frozenset(person["id"] for person in people if self._left(person))
-            yield _Page(people, left, _stories(db, [person["id"] for person in people], choice.phases))
+            yield _Page(db, people, left, choice.phases, self._definitions, self._bundles)
 
     def _left(self, person: tidy.Row) -> bool:
         began = self._lease_began[person["study_version"]]
         return has_left(person["status"], person["last_seen_utc"], began)
 
     def pieces(self, sheet: Sheet) -> Iterator[bytes]:
-        """Give one table, or the codebook, from its header to its end."""
-        build = _BUILDERS.get(Path(sheet.name).stem)
-        if build is None:
-            yield from sheet.pieces(codebook.rows())
-            return
-        for page in self.pages():
-            yield from sheet.pieces(build(self._choice.slug, page))
-        yield from sheet.pieces()
+        """Give one table from its header to its end."""
+        if build := _BUILDERS.get(sheet.table):
+            for page in self.pages():
+                yield from sheet.pieces(build(self._choice.slug, page))
+        yield from sheet.pieces(self.rows(sheet.table))
+
+    def rows(self, table: str) -> Iterator[tidy.Cells]:
+        """Give the rows of a table that is not made person by person; of another none."""
+        if table == "flow":
+            yield from flow.rows(self._choice.slug, self._flows)
+        if table == "codebook":
+            yield from codebook.rows()
 
     def entry(self, name: str) -> zipfile.ZipInfo:
         """Describe a file of the zip."""
         entry = zipfile.ZipInfo(f"{self._choice.slug}/{name}", self._moment.timetuple()[:6])
         entry.compress_type = zipfile.ZIP_DEFLATED
         return entry
+
+    def _agents(self) -> set[str]:
+        return {name for definition in self._definitions.values() for name in definition.agents}
 
     def manifest(self, sheets: Sequence[Sheet]) -> dict[str, Any]:
         """Say what the files are, once they have gone out."""
@@ -221,6 +279,8 @@ class _Source:
             "study_versions": versions,
             "modes": list(self._choice.modes),
             "practice": self._choice.practice,
+            "flow": {each.mode: each.whole for each in self._flows},
+            "agents_not_loaded": sorted(self._agents() - set(self._bundles)),
             "exported_utc": canonical.utc_text(self._moment),
             "hatlab": version("hatlab"),
             "files": {sheet.name: sheet.facts for sheet in sheets},
@@ -235,8 +295,9 @@ def _stories(db: DbSession, people: Sequence[str], phases: Sequence[str]) -> Ite
 
 
 def _participants(slug: str, page: _Page) -> Iterator[tidy.Cells]:
-    for key, person in page.people.items():
-        yield tidy.participant_row(slug, person, left=key in page.left)
+    for person, counted in page.tallies():
+        pay = page.definition(person).pay
+        yield tidy.participant_row(slug, person, counted, pay, left=person["id"] in page.left)
 
 
 def _trials(slug: str, page: _Page) -> Iterator[tidy.Cells]:
@@ -255,9 +316,40 @@ def _agents(_slug: str, page: _Page) -> Iterator[tidy.Cells]:
         yield from tidy.agent_rows(told, track)
 
 
+def _answers(slug: str, page: _Page) -> Iterator[tidy.Cells]:
+    for key, given in page.answers.items():
+        person = page.people[key]
+        yield from tidy_answers.answer_rows(slug, person, page.definition(person), given)
+
+
+def _probe(_slug: str, page: _Page) -> Iterator[tidy.Cells]:
+    for key, given in page.answers.items():
+        person = page.people[key]
+        places, numbers = (
+            tidy_answers.permuted(person, name) for name in ("token_permutation", "number_permutation")
+        )
+        marks = probe.marks(page.lexicon(person), places, numbers, given)
+        yield from tidy_answers.probe_rows(person, page.definition(person), marks)
+
+
+def _browser_events(_slug: str, page: _Page) -> Iterator[tidy.Cells]:
+    return tidy_answers.browser_event_rows(page.browser_events())
+
+
+def _journey(_slug: str, page: _Page) -> Iterator[tidy.Cells]:
+    return tidy_answers.journey_rows(page.journeys())
+
+
 _BUILDERS: dict[str, Callable[[str, _Page], Iterator[tidy.Cells]]] = {
     "participants": _participants,
     "trials": _trials,
     "steps": _steps,
     "agents": _agents,
+    "answers": _answers,
+    "probe": _probe,
+    "browser_events": _browser_events,
+    "journey": _journey,
 }
+"""Tables that are made person by person."""
+_WHOLE = ("flow", "codebook")
+"""Tables that are made once for the study."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from server.domain import canonical
+from server.domain.plan import page_kind
 from server.domain.study import from_json
 from server.services.lab import Lab
 from server.services.studies import Study
@@ -14,18 +15,36 @@ from server.storage.database import DbSession
 from server.storage.headcounts import Person, Tally
 
 MODES = ("live", "test", "preview", "robot")
-SHOWS = {"now": ("active",), "finished": ("finished",), "left": ("away", "abandoned")}
+LEFT = ("away", "withdrawn", "timed_out", "returned", "rejected")
+EXCLUDED = ("failed", "screened_out")
+SHOWS = {"now": ("active",), "finished": ("finished",), "left": LEFT, "excluded": EXCLUDED}
+"""Standings by what the list of people can show."""
+WORDS = {
+    "instructions": "How to play",
+    "practice": "Practice",
+    "quiz": "Quiz",
+    "play": "Rounds",
+    "survey": "Questionnaire",
+    "probe": "What the signs mean",
+    "complete": "Completion page",
+}
+"""What people call a page, by its kind."""
 PEOPLE_MAX = 50
 
 
 @dataclass(frozen=True, slots=True)
 class Headcount:
-    """`allocated` is the sum of the others; `left`: abandoned, or not seen while a place is held."""
+    """`allocated` is the sum of the others.
+
+    `left`: withdrew, returned, timed out, was rejected there, or was not seen for longer than the lease;
+    `excluded`: failed the quiz or too many attention checks.
+    """
 
     allocated: int
     finished: int
     active: int
     left: int
+    excluded: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,8 +145,8 @@ def headcount(tallies: Iterable[Tally]) -> Headcount:
     by: Counter[str] = Counter()
     for tally in tallies:
         by[tally.standing] += tally.people
-    left = by["away"] + by["abandoned"]
-    return Headcount(by.total(), by["finished"], by["active"], left)
+    left, excluded = (sum(by[each] for each in standings) for standings in (LEFT, EXCLUDED))
+    return Headcount(by.total(), by["finished"], by["active"], left, excluded)
 
 
 def split(pairs: Iterable[tuple[str, int]]) -> tuple[tuple[str, int], ...]:
@@ -138,7 +157,7 @@ def split(pairs: Iterable[tuple[str, int]]) -> tuple[tuple[str, int], ...]:
 
 
 def people(db: DbSession, lab: Lab, study: Study, mode: str, show: str) -> tuple[PersonLine, ...]:
-    """The last seen of a mode: who plays now, has finished, or has left."""
+    """The last seen of a mode: who plays now, has finished, has left, or is excluded."""
     rows = headcounts.people(db, study.row.id, mode, SHOWS[show], seen_since(lab, study), PEOPLE_MAX)
     rounds = {each.number: rounds_of(each.definition) for each in studies.versions(db, study.row.id)}
     return tuple(person_line(row, rounds[row.version], lab.now()) for row in rows)
@@ -169,10 +188,8 @@ def person_line(row: Person, rounds: int, now: datetime) -> PersonLine:
 
 def where(page: str) -> str:
     """The page a person is on, in words."""
-    kind, _, block = page.partition(":")
-    words = {"instructions": "How to play", "play": "Rounds", "complete": "Completion page"}
-    named = words.get(kind, kind.capitalize())
-    return f"{named}, block {block}" if block else named
+    kind, block = page_kind(page)
+    return f"{WORDS[kind]}, block {block}" if block else WORDS[kind]
 
 
 def ago(then_utc: str, now: datetime) -> str:

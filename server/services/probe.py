@@ -1,6 +1,7 @@
 """The probe of the signs: what the page draws, and how good the marks are against P(cell | token)."""
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -10,6 +11,9 @@ from server.services.lab import Lab
 from server.services.session import Session, session_of
 from server.storage.answers import AnswerRow
 from server.storage.database import DbSession
+
+if TYPE_CHECKING:
+    from models.policies.lexicon import Lexicon
 
 PREFIX = "sign_"
 
@@ -25,13 +29,13 @@ class Mark(NamedTuple):
     """Index in the bundle's codebook."""
     row: int
     column: int
-    probability: float
-    """P(cell | token) of the marked cell."""
-    best: float
+    probability: float | None
+    """P(cell | token) of the marked cell. This and what follows: None where the agent is not loaded."""
+    best: float | None
     """The largest P(cell | token)."""
-    distance: float
+    distance: float | None
     """Expected number of steps from the marked cell to where the token was said."""
-    least: float
+    least: float | None
     """The same for the best cell that could be marked."""
 
 
@@ -51,11 +55,17 @@ def panel_data(lab: Lab, session: Session) -> dict[str, Any]:
     return {"size": 9, "signs": signs}
 
 
-def marks(lab: Lab, session: Session, rows: list[AnswerRow]) -> list[Mark]:
-    """Every mark of a participant, scored against the lexicon of the agent that they played with."""
-    lexicon = lab.agent(session.arm.bundle).lexicon
-    places = canonical.loads(session.participant.token_permutation)
-    numbers = canonical.loads(session.participant.number_permutation)
+def marks(
+    lexicon: "Lexicon | None", places: Sequence[int], numbers: Sequence[int], rows: Sequence[AnswerRow]
+) -> list[Mark]:
+    """Every mark of a participant, scored against the lexicon of the agent that they played with.
+
+    Args:
+        lexicon: of the arm's bundle; None: it is not loaded, and the marks stay without scores.
+        places: position of each token, as the participant saw the panel.
+        numbers: number at each position, likewise.
+        rows: the participant's answers.
+    """
     found = []
     for answer in rows:
         if answer.form != "probe:0" or not answer.value:
@@ -64,23 +74,22 @@ def marks(lab: Lab, session: Session, rows: list[AnswerRow]) -> list[Mark]:
         position = numbers.index(sign)
         token = places.index(position)
         row, column = (int(part) for part in answer.value.split(","))
-        found.append(mark(sign, position, token, row, column, np.asarray(lexicon.probability[token])))
+        scores = score(np.asarray(lexicon.probability[token]), row, column) if lexicon else (None,) * 4
+        found.append(Mark(sign, position, token, row, column, *scores))
     return found
 
 
-def mark(sign: int, position: int, token: int, row: int, column: int, said: Any, size: int = 9) -> Mark:
-    """Score one mark; `said` is P(cell | token) over size * size cells, row by row."""
+def score(said: Any, row: int, column: int, size: int = 9) -> tuple[float, float, float, float]:
+    """How good one mark is: probability, best, distance and least of a `Mark`.
+
+    `said` is P(cell | token) over size * size cells, row by row.
+    """
     cells = np.arange(size * size)
     away = np.abs(cells // size - row) + np.abs(cells % size - column)
     every = np.abs(cells[:, None] // size - cells[None] // size) + np.abs(
         cells[:, None] % size - cells[None] % size
     )
-    return Mark(
-        sign,
-        position,
-        token,
-        row,
-        column,
+    return (
         float(said[row * size + column]),
         float(said.max()),
         float(said @ away),

@@ -18,6 +18,7 @@ class Sheet:
     """One CSV file in the making: RFC 4180, the header of the codebook first."""
 
     def __init__(self, table: str) -> None:
+        self.table = table
         self.name = f"{table}.csv"
         self._text = io.StringIO()
         self._writer = csv.writer(self._text, lineterminator="\r\n")
@@ -61,17 +62,19 @@ def plain(header: Sequence[str], rows: Iterable[Sequence[str]]) -> bytes:
 
 
 def safe(row: Sequence[Any], guarded: Sequence[int]) -> Sequence[Any]:
-    """Put `'` before the texts that a spreadsheet would run.
+    """Put `'` before the texts that a spreadsheet would run; numbers stay numbers.
 
-    >>> safe(["=1+1", -2], [0])
+    >>> safe(["=1+1", -2], [0, 1])
     ["'=1+1", -2]
     """
     for index in guarded:
-        if row[index] and row[index][0] in UNSAFE:
+        cell = row[index]
+        if cell and cell.__class__ is str and cell[0] in UNSAFE:
             break
     else:
         return row
-    return [
-        f"'{cell}" if index in guarded and cell and cell[0] in UNSAFE else cell
-        for index, cell in enumerate(row)
-    ]
+    return [guard(cell) if index in guarded else cell for index, cell in enumerate(row)]
+
+
+def guard(cell: Any) -> Any:
+    return f"'{cell}" if isinstance(cell, str) and cell[:1] in UNSAFE else cell

@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 
 from models.vocabulary import SILENT
 from server.domain.events import rt_valid
+from server.domain.flow import ABANDONED, exclusion_reason
+from server.domain.money import bonus_minor, reward_minor
+from server.domain.study import Pay
 from server.services import codebook
 
 Row = Mapping[str, Any]
@@ -21,7 +24,6 @@ Cells = tuple[Any, ...]
 FLAG: Mapping[Any, str | None] = {True: "true", False: "false", None: None}
 GOOD_OUTCOMES = frozenset({"found", "arrived"})
 BAD_OUTCOMES = frozenset({"not_found", "collision", "limit"})
-ABANDONED = "abandoned"
 ACTION_NAMES: Mapping[str, tuple[str, ...]] = {
     "parent": ("up", "right", "down", "left"),
     "driver": ("go", "brake"),
@@ -85,17 +87,42 @@ def story(trial: Row, events: Sequence[tuple[int, Row, str]]) -> Story:
     return Story(trial, bodies[0], decisions)
 
 
-def participant_row(study: str, person: Row, *, left: bool) -> Cells:
+class Tally(NamedTuple):
+    """What is counted of a person; None where the data were erased."""
+
+    won: int | None
+    attention_failed: int | None
+
+
+def participant_row(study: str, person: Row, counted: Tally, pay: Pay | None, *, left: bool) -> Cells:
     """Build a row of participants.csv; `left`: unfinished, and not heard of for longer than the lease."""
+    status = ABANDONED if left else person["status"]
+    reason = exclusion_reason(status)
     own = {
         **person,
+        **counted._asdict(),
+        **money_of(pay, status, counted.won or 0),
         "study": study,
         "participant": person["id"],
-        "status": ABANDONED if left else person["status"],
+        "status": status,
         "token_permutation": permutation(person["token_permutation"]),
         "number_permutation": permutation(person["number_permutation"]),
+        "excluded": FLAG[reason is not None],
+        "exclusion_reason": reason,
+        "erased": FLAG[person["erased_utc"] is not None],
     }
     return tuple(own[column.name] for column in codebook.PARTICIPANTS)
+
+
+def money_of(pay: Pay | None, status: str, won: int) -> dict[str, Any]:
+    """What the study's rule gives to somebody of this status; empty where the study states no pay."""
+    if pay is None:
+        return dict.fromkeys(("currency", "reward_minor", "bonus_minor"))
+    return {
+        "currency": pay.currency,
+        "reward_minor": reward_minor(pay, status),
+        "bonus_minor": bonus_minor(pay, status, won),
+    }
 
 
 def permutation(stored: str | None) -> str | None:

@@ -139,6 +139,15 @@ class Database:
                 f"database {self.shown_url} was migrated by another hatlab, perhaps a newer one: {error}"
             ) from error
 
+    def settle(self) -> None:
+        """SQLite: empty the log into the file, so that what was deleted stands in neither.
+
+        Does what it can while others read. PostgreSQL's autovacuum does the same in its own time.
+        """
+        if self.is_sqlite:
+            with self.engine.connect() as connection:
+                connection.exec_driver_sql("PRAGMA wal_checkpoint(TRUNCATE)")
+
     def _unusable(self, error: DatabaseError) -> NotReadyError:
         return NotReadyError(f"database {self.shown_url} cannot be used: {error.orig}")
 
@@ -180,6 +189,7 @@ def prepare_sqlite(connection: Any, _record: object) -> None:
         "journal_mode=WAL",
         "synchronous=FULL",
         "foreign_keys=ON",
+        "secure_delete=ON",  # what is erased is overwritten in the file, not only unlinked
     ):
         connection.execute(f"PRAGMA {pragma}")
 

@@ -1,12 +1,26 @@
 """Deleting what is known of a person: their data, or all of them."""
 
-from sqlalchemy import delete, update
+import secrets
+
+from sqlalchemy import ColumnElement, delete, func, select, update
 
 from server.storage.database import DbSession
-from server.storage.tables import answer, browser_event, identity, participant, payment, trial
+from server.storage.tables import (
+    answer,
+    browser_event,
+    identity,
+    journey,
+    participant,
+    payment,
+    posting,
+    submission,
+    trial,
+)
 
 DATA = (trial, answer, browser_event)
 """What somebody did; events go with their trials."""
+SENT = "sent"
+"""State of a payment that is on its way."""
 
 
 def delete_data(db: DbSession, participant_id: str) -> None:
@@ -18,7 +32,47 @@ def delete_data(db: DbSession, participant_id: str) -> None:
 def delete_person(db: DbSession, participant_id: str) -> None:
     """Everything; of payments only the money stays."""
     delete_data(db, participant_id)
-    forgotten = update(payment).where(payment.c.participant_id == participant_id)
-    db.write(forgotten.values(participant_id="", submission_id="", detail=""))
+    for request in list(db.read(select(payment.c.request).where(of_person(participant_id))).scalars()):
+        nameless = {"request": f"erased-{secrets.token_hex(12)}", "participant_id": "", "submission_id": ""}
+        forgotten = update(payment).where(payment.c.request == request)
+        db.write(forgotten.values(**nameless, reference="", detail=""))
     db.write(delete(identity).where(identity.c.participant_id == participant_id))
     db.write(delete(participant).where(participant.c.id == participant_id))
+
+
+def delete_submissions(db: DbSession, study_id: int, external_hash: str) -> None:
+    """What a marketplace told of somebody's submissions to a study."""
+    db.write(delete(submission).where(of_hash(study_id, external_hash)))
+
+
+def of_person(participant_id: str) -> ColumnElement[bool]:
+    return payment.c.participant_id == participant_id
+
+
+def of_hash(study_id: int, external_hash: str) -> ColumnElement[bool]:
+    mine = select(posting.c.id).where(posting.c.study_id == study_id)
+    return (submission.c.external_hash == external_hash) & submission.c.posting_id.in_(mine)
+
+
+def held(db: DbSession, participant_id: str) -> dict[str, int]:
+    """How many rows there are of a person, by what they are."""
+    found = {}
+    for name, table in {
+        "rounds": trial,
+        "answers": answer,
+        "window events": browser_event,
+        "steps of the journey": journey,
+    }.items():
+        count = select(func.count()).select_from(table).where(table.c.participant_id == participant_id)
+        found[name] = int(db.read(count).scalar_one())
+    return found
+
+
+def submissions(db: DbSession, study_id: int, external_hash: str) -> int:
+    count = select(func.count()).select_from(submission).where(of_hash(study_id, external_hash))
+    return int(db.read(count).scalar_one())
+
+
+def payments(db: DbSession, participant_id: str) -> list[str]:
+    """State of each payment to a person."""
+    return list(db.read(select(payment.c.state).where(of_person(participant_id))).scalars())

@@ -3,13 +3,27 @@
 Keyset pages keep memory constant and need no sort over the whole study. Nothing here touches `identity`.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import Any, cast
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 
+from server.storage.answers import AnswerRow
+from server.storage.browser_log import BrowserEventRow
 from server.storage.database import DbSession
-from server.storage.tables import allocation, consent, event, participant, study, study_version, trial
+from server.storage.journeys import JourneyRow
+from server.storage.tables import (
+    allocation,
+    answer,
+    browser_event,
+    consent,
+    event,
+    journey,
+    participant,
+    study,
+    study_version,
+    trial,
+)
 
 Row = Mapping[str, Any]
 Event = tuple[str, int, str, str]
@@ -24,6 +38,7 @@ def study_row(db: DbSession, slug: str) -> Row | None:
 def version_rows(db: DbSession, study_id: int) -> list[Row]:
     """Every launched version, oldest first, with its definition as text."""
     columns = (
+        study_version.c.id,
         study_version.c.number,
         study_version.c.sha256,
         study_version.c.launched_utc,
@@ -75,3 +90,53 @@ def event_rows(db: DbSession, participants: Sequence[str], phases: Sequence[str]
         .execution_options(yield_per=ROWS_A_FETCH)
     )
     yield from cast("Iterator[Event]", db.read(statement))
+
+
+def won(db: DbSession, participants: Sequence[str], outcomes: Collection[str]) -> dict[str, int]:
+    """How many main rounds each of these people has won; who won none is not there."""
+    statement = (
+        select(trial.c.participant_id, func.count())
+        .where(trial.c.participant_id.in_(participants), trial.c.phase == "main")
+        .where(trial.c.outcome.in_(outcomes))
+        .group_by(trial.c.participant_id)
+    )
+    return dict(cast("list[tuple[str, int]]", [tuple(row) for row in db.read(statement)]))
+
+
+def attention_failed(db: DbSession, participants: Sequence[str]) -> dict[str, int]:
+    """How many attention checks each of these people has failed; who failed none is not there."""
+    statement = (
+        select(answer.c.participant_id, func.count(answer.c.form.distinct()))
+        .where(answer.c.participant_id.in_(participants), answer.c.correct.is_(False))
+        .where(answer.c.form.startswith("attention:", autoescape=True))
+        .group_by(answer.c.participant_id)
+    )
+    return dict(cast("list[tuple[str, int]]", [tuple(row) for row in db.read(statement)]))
+
+
+def answer_rows(db: DbSession, participants: Sequence[str]) -> list[AnswerRow]:
+    """Everything that these people answered, in no order."""
+    statement = select(answer).where(answer.c.participant_id.in_(participants))
+    return [AnswerRow._make(row) for row in db.read(statement)]
+
+
+def browser_event_rows(db: DbSession, participants: Sequence[str]) -> Iterator[BrowserEventRow]:
+    """What the browsers of these people told, by participant, visit and seq, streamed."""
+    key = (browser_event.c.participant_id, browser_event.c.visit, browser_event.c.seq)
+    statement = (
+        select(browser_event)
+        .where(browser_event.c.participant_id.in_(participants))
+        .order_by(*key)
+        .execution_options(yield_per=ROWS_A_FETCH)
+    )
+    yield from map(BrowserEventRow._make, db.read(statement))
+
+
+def journey_rows(db: DbSession, participants: Sequence[str]) -> list[JourneyRow]:
+    """What happened to these people, by participant and seq."""
+    statement = (
+        select(journey)
+        .where(journey.c.participant_id.in_(participants))
+        .order_by(journey.c.participant_id, journey.c.seq)
+    )
+    return [JourneyRow._make(row) for row in db.read(statement)]

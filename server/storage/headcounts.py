@@ -9,7 +9,7 @@ from server.storage.tables import participant, study_version, trial
 
 
 class Tally(NamedTuple):
-    """People who agree in all of this; `standing`: finished, active, away (not seen since), abandoned."""
+    """People who agree in all of this; `standing`: the stored status, or `away` (active, not seen since)."""
 
     version: int
     mode: str
@@ -19,6 +19,15 @@ class Tally(NamedTuple):
     standing: str
     people: int
     last_seen_utc: str
+
+
+class Stand(NamedTuple):
+    """People of one version who agree in mode, arm and standing."""
+
+    mode: str
+    arm: str
+    standing: str
+    people: int
 
 
 class Person(NamedTuple):
@@ -56,6 +65,18 @@ def tallies(db: DbSession, study_id: int, seen_since_utc: str) -> list[Tally]:
         .group_by(*cell)
     )
     return [Tally._make(row) for row in db.read(statement)]
+
+
+def stands(db: DbSession, study_version_id: int, seen_since_utc: str) -> list[Stand]:
+    """Everybody of one version, whose lease began then."""
+    cell = (participant.c.mode, participant.c.arm, standing(seen_since_utc))
+    statement = (
+        select(*cell, func.count())
+        .where(participant.c.study_version_id == study_version_id)
+        .group_by(*cell)
+        .order_by(*cell)
+    )
+    return [Stand._make(row) for row in db.read(statement)]
 
 
 def people(

@@ -62,6 +62,11 @@ def by_id(db: DbSession, participant_id: str) -> ParticipantRow:
     return ParticipantRow._make(db.read(PARTICIPANT.where(participant.c.id == participant_id)).one())
 
 
+def find(db: DbSession, participant_id: str) -> ParticipantRow | None:
+    row = db.read(PARTICIPANT.where(participant.c.id == participant_id)).one_or_none()
+    return ParticipantRow._make(row) if row else None
+
+
 def hold(db: DbSession, participant_id: str) -> ParticipantRow:
     """The participant, locked until the transaction ends."""
     db.hold()

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from sqlalchemy import func, insert, select
+from sqlalchemy import delete, func, insert, select
 
 from server.storage.database import DbSession
 from server.storage.tables import refusal
@@ -32,6 +32,11 @@ def of(db: DbSession, study_id: int, external_hash: str) -> RefusalRow | None:
     )
     row = db.read(statement).one_or_none()
     return RefusalRow._make(row) if row else None
+
+
+def delete_of(db: DbSession, study_id: int, external_hash: str) -> None:
+    """Forget that somebody does not take part."""
+    db.write(delete(refusal).where(refusal.c.study_id == study_id, refusal.c.external_hash == external_hash))
 
 
 def counts(db: DbSession, study_id: int, mode: str) -> dict[str, int]:

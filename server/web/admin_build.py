@@ -78,6 +78,7 @@ def page(
         arms=tuple(range(len(values.get("arms", ())))),
         bundles=choices(lab.offers, str(values["environment"])),
         communications=admin_forms.communications(task),
+        roles=("parent", "child") if task == "parent_child" else ("driver",),
         mistakes=admin_forms.mistakes(errors),
         wrong_sections=admin_forms.wrong_sections(errors),
         base=study.base,
@@ -136,13 +137,40 @@ def steps(values: Mapping[str, Any], task: Task) -> tuple[Step, ...]:
     """What a participant goes through."""
     trials, practice = (str(values.get(name, "–") or "–") for name in ("trials_per_block", "practice_rounds"))
     way = [Step("Entry and consent", "")]
-    for name in ("as parent", "as child") if task == "parent_child" else ("",):
+    for role, name in (
+        (("parent", "as parent"), ("child", "as child")) if task == "parent_child" else (("", ""),)
+    ):
         way += [
             Step(f"How to play {name}".strip(), ""),
             Step(f"Practice {name}".strip(), practice),
+            *asked("Quiz", questions(values, "quiz", role)),
             Step(f"Rounds {name}".strip(), trials),
+            *asked("Questions about the rounds", items(values, "block")),
         ]
-    return (*way, Step("Completion code", ""))
+    way += asked("Attention checks in between", len(listed(values, "attention")))
+    way += [Step("What the signs mean", "")] if values.get("token_probe") in {True, "true"} else []
+    return (*way, *asked("Last questions", items(values, "end")), Step("Completion code", ""))
+
+
+def asked(name: str, number: int) -> list[Step]:
+    """A step with so many questions; none where nothing is asked."""
+    return [Step(name, str(number))] if number else []
+
+
+def listed(values: Mapping[str, Any], name: str) -> list[Mapping[str, Any]]:
+    """The parts of a list that was typed, as far as they can be read."""
+    given = values.get(name, ())
+    return [part for part in given if isinstance(part, Mapping)] if isinstance(given, list | tuple) else []
+
+
+def questions(values: Mapping[str, Any], name: str, role: str) -> int:
+    return sum(not role or part.get("role") in {None, role} for part in listed(values, name))
+
+
+def items(values: Mapping[str, Any], when: str) -> int:
+    """How many items all questionnaires of one place have."""
+    parts = [part for part in listed(values, "questionnaires") if part.get("when", "end") == when]
+    return sum(len(listed(part, "items")) for part in parts)
 
 
 def places(values: Mapping[str, Any]) -> str:

@@ -9,7 +9,9 @@ from starlette.responses import Response
 
 from server.services import monitor, studies
 from server.services.export import stream_zip
+from server.services.flow import flows
 from server.services.monitor import MODES, SHOWS, ModeCounts
+from server.web import admin_flow
 from server.web.admin_access import CurrentVisitor, signed_in
 from server.web.admin_frame import entry_links, frame, head
 from server.web.admin_pages import Filter, MonitorPage
@@ -30,6 +32,7 @@ def monitor_page(
         chosen = mode if mode in MODES else study.row.mode
         shown = show if show in SHOWS else "now"
         people = monitor.people(db, lab, study, chosen, shown)
+        [flow] = flows(db, study.row.id, lab.now(), [chosen])
         surround = frame(db, lab, visitor)
     url = f"/admin/studies/{slug}/monitor"
     arms = progress.arms[chosen]
@@ -42,6 +45,9 @@ def monitor_page(
             for name, counts in progress.modes.items()
         ),
         counts=progress.modes[chosen],
+        never_entered=sum(people for _, people in admin_flow.boxes(flow)[0].lost),
+        flow=admin_flow.boxes(flow),
+        flow_arms=admin_flow.arms(flow),
         arms=tuple(arm for arm in arms if arm.version == progress.newest),
         earlier=tuple(arm for arm in arms if arm.version != progress.newest),
         shows=shows(progress.modes[chosen], url, chosen, shown),
@@ -55,7 +61,7 @@ def monitor_page(
 
 
 def shows(counts: ModeCounts, url: str, mode: str, shown: str) -> tuple[Filter, ...]:
-    names = {"now": "Playing", "finished": "Finished", "left": "Left"}
+    names = {"now": "Playing", "finished": "Finished", "left": "Left", "excluded": "Excluded"}
     return tuple(
         Filter(
             f"{names[show]} {shown_of(counts, show)}",
@@ -68,7 +74,8 @@ def shows(counts: ModeCounts, url: str, mode: str, shown: str) -> tuple[Filter, 
 
 def shown_of(counts: ModeCounts, show: str) -> int:
     people = counts.people
-    return {"now": people.active, "finished": people.finished, "left": people.left}[show]
+    shown = {"now": people.active, "finished": people.finished, "left": people.left}
+    return (shown | {"excluded": people.excluded})[show]
 
 
 @router.get("/admin/studies/{slug}/export.zip")

@@ -163,6 +163,7 @@ class BuildPage:
     arms: tuple[int, ...]
     bundles: tuple[BundleChoice, ...]
     communications: tuple[tuple[str, str], ...]
+    roles: tuple[str, ...]
     mistakes: tuple[Mistake, ...]
     wrong_sections: frozenset[str]
     base: str
@@ -191,6 +192,25 @@ class ConfirmPage:
 
 
 @dataclass(frozen=True, slots=True)
+class FlowBox:
+    """One box of the diagram: how many came here, and who does not come to the next."""
+
+    label: str
+    people: int
+    lost: tuple[tuple[str, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FlowArm:
+    """The flow within one arm."""
+
+    name: str
+    allocated: int
+    finished: int
+    analysed: int
+
+
+@dataclass(frozen=True, slots=True)
 class MonitorPage:
     template: ClassVar[str] = "admin/monitor.html"
     frame: Frame
@@ -198,6 +218,10 @@ class MonitorPage:
     mode: str
     modes: tuple[Filter, ...]
     counts: ModeCounts
+    never_entered: int
+    """Declined, or the device did not fit."""
+    flow: tuple[FlowBox, ...]
+    flow_arms: tuple[FlowArm, ...]
     arms: tuple[ArmCount, ...]
     earlier: tuple[ArmCount, ...]
     shows: tuple[Filter, ...]

@@ -1,16 +1,16 @@
 """What is told at each end that somebody in a study can come to: where they stand, and what to do next."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from server.domain.money import shown
+from server.domain.money import reward_minor, shown
 from server.domain.participation import State as Standing
 from server.domain.study import StudyDefinition
-from server.recruitment import mturk
+from server.recruitment import mturk, prolific
 from server.recruitment.arrival import Arrival, ExitLink
 from server.recruitment.recognition import exit_link
 from server.services.pages import Page as State
-from server.web.pages import EndPage, Icon
+from server.web.pages import Action, EndPage, Icon
 
 
 class Told(NamedTuple):
@@ -19,6 +19,15 @@ class Told(NamedTuple):
     paragraphs: tuple[str, ...]
 
 
+HEADINGS: Mapping[Standing, str] = {
+    Standing.FINISHED: "Thank you, you are finished",
+    Standing.FAILED: "Thank you, you are finished",
+    Standing.WITHDRAWN: "You have left the study",
+    Standing.SCREENED_OUT: "The study ends here for you",
+    Standing.TIMED_OUT: "Your time for this study is over",
+    Standing.RETURNED: "You have returned your place",
+    Standing.REJECTED: "This session is closed",
+}
 KEPT = "What you did so far is kept, as you allowed."
 ERASED = (
     "What you did in the study has been deleted. The identifier that pays you is kept until you are paid."
@@ -57,9 +66,24 @@ def end_page(state: State, submit_hosts: Collection[str] = mturk.SUBMIT_HOSTS) -
         rounds=state.progress.rounds,
         paid=paid_of(state),
         goes_by_itself=through,
+        elsewhere=None if link else home(state.marketplace, state.parameters),
         language=study.texts.language,
         direction=study.texts.direction,
     )
+
+
+def home(marketplace: str, parameters: Mapping[str, str]) -> Action | None:
+    """Where the person's work is listed on the site that sent them; none for who came by a direct link."""
+    if marketplace == "prolific":
+        return Action("Go to Prolific", prolific.HOME)
+    if marketplace == "mturk":
+        return Action("Go to Mechanical Turk", mturk.home(parameters))
+    return None
+
+
+def again(study: StudyDefinition) -> Action:
+    """For who declined and was not named: the page can be read again, and nothing was kept."""
+    return Action("Read about the study again", f"/s/{study.slug}")
 
 
 def link_of(state: State, code: str, submit_hosts: Collection[str]) -> ExitLink | None:
@@ -71,18 +95,19 @@ def link_of(state: State, code: str, submit_hosts: Collection[str]) -> ExitLink 
 def told_of(state: State) -> Told:
     """The words of an end; whoever failed attention checks is thanked like everybody."""
     study, standing = state.study, state.state
+    heading = HEADINGS[standing]
     contact = CONTACT.format(contact=study.contact)
     pay = WITH_CODE if state.code else BACK
     if standing in {Standing.FINISHED, Standing.FAILED}:
-        return Told("good", "Thank you, you are finished", (study.texts.complete,))
+        return Told("good", heading, (study.texts.complete,))
     if standing is Standing.WITHDRAWN:
-        return Told("info", "You have left the study", (KEPT if state.data_kept else ERASED, pay))
+        return Told("info", heading, (KEPT if state.data_kept else ERASED, pay))
     if standing is Standing.SCREENED_OUT:
-        return Told("info", "The study ends here for you", screened_out(state.code or "", contact))
+        return Told("info", heading, screened_out(state.code or "", contact))
     others: dict[Standing, Told] = {
         Standing.TIMED_OUT: Told(
             "wait",
-            "Your time for this study is over",
+            heading,
             (
                 "You were away for a while, and your place has been given to somebody else.",
                 "Your site may let you take a new place: then its link brings you back to where you were.",
@@ -91,7 +116,7 @@ def told_of(state: State) -> Told:
         ),
         Standing.RETURNED: Told(
             "info",
-            "You have returned your place",
+            heading,
             (
                 "Nothing more is expected of you.",
                 "If you take a place again on the site that sent you, its link brings you back here.",
@@ -99,7 +124,7 @@ def told_of(state: State) -> Told:
         ),
         Standing.REJECTED: Told(
             "stop",
-            "This session is closed",
+            heading,
             ("The site that sent you has closed your submission.", contact),
         ),
     }
@@ -137,6 +162,7 @@ def refused_page(
         rounds=0,
         paid=(),
         goes_by_itself=False,
+        elsewhere=None if link and named else home(arrival.marketplace, arrival.parameters) or again(study),
         language=study.texts.language,
         direction=study.texts.direction,
     )
@@ -152,15 +178,9 @@ def paid_of(state: State) -> tuple[tuple[str, str], ...]:
     pay = state.study.pay
     if pay is None:
         return ()
-    amounts = {
-        Standing.FINISHED: pay.reward_minor,
-        Standing.FAILED: pay.reward_minor,
-        Standing.WITHDRAWN: pay.partial_minor,
-        Standing.SCREENED_OUT: pay.screen_out_minor,
-    }
     lines = []
-    if amounts.get(state.state):
-        lines.append(("For your time", shown(amounts[state.state], pay.currency)))
+    if reward := reward_minor(pay, state.state):
+        lines.append(("For your time", shown(reward, pay.currency)))
     if state.state in {Standing.FINISHED, Standing.FAILED} and pay.bonus_success_minor:
         won = f"Bonus for {state.progress.won} of {state.progress.rounds} rounds"
         lines.append((won, shown(state.progress.bonus_minor, pay.currency)))

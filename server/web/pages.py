@@ -119,7 +119,10 @@ class InstructionsPage:
 
 @dataclass(frozen=True, slots=True)
 class PlayPage:
-    """The page of the board; `data` is the JSON of #page-data and repeats what the scripts need."""
+    """The page of the board; `data` is the JSON of #page-data and repeats what the scripts need.
+
+    In it `won` are the rounds won so far, and `bonuses` what so many are worth (empty: no bonus).
+    """
 
     template: ClassVar[str] = "participant/play.html"
     title: str
@@ -160,7 +163,7 @@ class FormPage:
     error: str
     answers_url: str
     data: Mapping[str, Any]
-    """JSON of #page-data: events_url, and for the probe size and signs."""
+    """JSON of #page-data: events_url, the page's name in the log, and for the probe size and signs."""
     bar: Bar
     language: str
     direction: str
@@ -171,8 +174,9 @@ class EndPage:
     """Every end that somebody who was in the study can come to; says what to do next.
 
     With `fields` the way back is a form that posts them to `url` (MTurk), without it is a link (Prolific);
-    without `url` the code is all there is; without `code` nothing is to be handed in. `paid` lines say what
-    will be paid. `goes_by_itself`: the way back is taken after a countdown.
+    without `url` the code is all there is; without `code` nothing is to be handed in, and `elsewhere` is a
+    link that goes on. `paid` lines say what will be paid. `goes_by_itself`: the way back is taken after a
+    countdown.
     """
 
     template: ClassVar[str] = "participant/end.html"
@@ -190,6 +194,7 @@ class EndPage:
     goes_by_itself: bool
     language: str
     direction: str
+    elsewhere: Action | None = None
     fields: Mapping[str, str] = field(default_factory=dict)
 
 

@@ -7,7 +7,7 @@ from server.domain.forms import Form
 from server.domain.money import shown
 from server.domain.questionnaire import Item
 from server.domain.study import StudyDefinition
-from server.services import probe
+from server.services import pages, probe
 from server.services.lab import Lab
 from server.services.pages import Page as State
 from server.web.pages import Bar, FormPage, InstructionsPage, PlayPage, Question, WithdrawPage
@@ -40,6 +40,14 @@ def bonus_rule(study: StudyDefinition) -> str:
     return f"{each} for each {won}, at most {most}"
 
 
+def bonuses(study: StudyDefinition) -> list[str]:
+    """What 0, 1, 2 … rounds won are worth, in words; empty without a bonus: the bar counts on."""
+    pay = study.pay
+    if pay is None or not pay.bonus_success_minor:
+        return []
+    return [shown(pages.bonus_minor(study, won), pay.currency) for won in range(study.main_rounds + 1)]
+
+
 def instructions_page(state: State, key: str) -> InstructionsPage:
     study = state.study
     return InstructionsPage(
@@ -70,6 +78,8 @@ def play_page(state: State, key: str) -> PlayPage:
         **addresses,
         "events_url": f"/p/{key}/events",
         "page": state.name,
+        "won": state.progress.won,
+        "bonuses": bonuses(study),
         "task": study.task,
         "role": state.role,
         "block": state.block,
@@ -112,15 +122,15 @@ def form_page(
         again=TRY_AGAIN if form.attempt > 1 else "",
         error=LOOK_AGAIN if errors else "",
         answers_url=f"/p/{key}/answers",
-        data=form_data(lab, form, key),
+        data=form_data(lab, state, form, key),
         bar=bar(state, key),
         language=study.texts.language,
         direction=study.texts.direction,
     )
 
 
-def form_data(lab: Lab, form: Form, key: str) -> dict[str, Any]:
-    data: dict[str, Any] = {"events_url": f"/p/{key}/events"}
+def form_data(lab: Lab, state: State, form: Form, key: str) -> dict[str, Any]:
+    data: dict[str, Any] = {"events_url": f"/p/{key}/events", "page": state.name}
     if form.kind == "probe":
         with lab.database.reading() as db:
             data |= probe.drawing(db, lab, key)

@@ -16,6 +16,7 @@ from models.reproduce.cells import Shelf
 from models.reproduce.publish import write
 from server.cli import app
 from server.settings import PACKAGED_BUNDLES, Settings
+from server.web import journey_map
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
@@ -170,6 +171,10 @@ def test_every_table_of_measured_numbers_says_which_command_printed_it(page: Pat
 
 def test_the_page_of_agents_is_what_their_evaluations_say() -> None:
     assert text(ROOT / "docs/released-agents.md") == roster.page(), "run `make docs`"
+
+
+def test_the_page_of_the_journey_is_what_the_code_decides() -> None:
+    assert text(ROOT / "docs/journey.md") == journey_map.page(), "run `make docs`"
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in tables.PACKAGED.glob("*.toml")))

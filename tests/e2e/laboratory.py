@@ -14,6 +14,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 
+from benchmarks.rounds_only import ROUNDS_ONLY
 from models.envs import registry
 from models.policies import bundle
 from models.policies.lexicon import Lexicon
@@ -21,6 +22,7 @@ from server.domain import study
 from server.services import studies
 from server.services.lab import Lab
 from server.settings import Settings
+from tests.e2e.journeys import PROLIFIC, WHOLE
 from tests.models.policies.bundles import TOKENS, tiny_manifest, tiny_policy
 
 ROOT = Path(__file__).parents[2]
@@ -36,7 +38,6 @@ SHORT = {
     "parent-child": {"slug": "short-parent-child", "trials_per_block": 2, "step_limit": 8},
     "traffic-junction": {"slug": "short-traffic", "trials_per_block": 3, "step_limit": 20},
 }
-PROLIFIC = "https://app.prolific.com/submissions/complete?cc={code}"
 
 
 @dataclass(frozen=True)
@@ -95,18 +96,21 @@ def agent(root: Path, task: str, name: str, channel: str) -> None:
 
 
 def shorten(here: Laboratory) -> None:
-    """Launch a short study of each task, with one arm per agent that is here."""
+    """Launch the short and the whole studies, with one arm per agent that is here."""
     settings = Settings(database_url=here.environment["HATLAB_DATABASE_URL"], bundles=here.folder / "bundles")
     lab = Lab.open(settings)
     with lab.database.writing() as db:
-        for template, changes in SHORT.items():
+        short = {changes["slug"]: (template, changes) for template, changes in SHORT.items()}
+        for slug, (template, changes) in (short | WHOLE).items():
             values = tomllib.loads((ROOT / "server" / "studies" / f"{template}.toml").read_text())
             arms = [arm for arm in values["arms"] if arm["bundle"] in AGENTS]
-            definition = study.read(values | changes | {"arms": arms, "completion_url": PROLIFIC})
-            slug = studies.create(
+            named = {"slug": slug, "arms": arms, "completion_url": PROLIFIC}
+            rounds_only = ROUNDS_ONLY if slug in short else {}
+            definition = study.read(values | rounds_only | changes | named)
+            made = studies.create(
                 db, lab, definition.model_dump(mode="json"), definition.title, definition.slug
             )
-            studies.freeze(db, lab, studies.find(db, slug).row.id, definition)
+            studies.freeze(db, lab, studies.find(db, made).row.id, definition)
     lab.database.close()
 
 

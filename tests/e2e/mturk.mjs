@@ -4,7 +4,7 @@
 
 import assert from "node:assert/strict";
 import { join } from "node:path";
-import { Participant, playing, press, result } from "./browser.mjs";
+import { Participant, passGate, playing, press, result } from "./browser.mjs";
 
 /** @import { Frame, Page } from "playwright-core" */
 /** @import { Place } from "./browser.mjs" */
@@ -78,7 +78,8 @@ async function cookiesAreBlocked(who, frame) {
  * @param {Page} page
  */
 async function enter(page) {
-  const consent = await inside(page, "input[name=read]");
+  const consent = await inside(page, "#check");
+  await passGate(await typing(page, consent));
   await consent.locator("input[name=read]").check();
   await consent.getByRole("button", { name: "I agree, start" }).click();
   const probe = await inside(page, "#probe");
@@ -142,4 +143,4 @@ async function look(who) {
   await preview(await who.tab());
 }
 
-await Participant.with(`mturk-${visit}`, artefacts, visit === "work" ? work : look, WINDOW, NO_FOREIGN_COOKIES);
+await Participant.with(`mturk-${visit}`, artefacts, visit === "work" ? work : look, WINDOW, {}, NO_FOREIGN_COOKIES);

@@ -5,7 +5,7 @@
 import assert from "node:assert/strict";
 import { randomBytes } from "node:crypto";
 import { serve } from "../static/serve.mjs";
-import { drawn, Participant, playing, press, result, SIZES, steps, strip } from "./browser.mjs";
+import { drawn, Participant, passGate, playing, press, result, SIZES, steps, strip } from "./browser.mjs";
 
 /** @import { Page } from "playwright-core" */
 
@@ -36,6 +36,7 @@ const invitation = () =>
  * @param {Page} page
  */
 async function consent(who, page) {
+  await passGate(page);
   await who.look(page, "consent");
   await page.getByRole("button", { name: "I agree, start" }).click();
   assert.match(String(await page.locator("#why").textContent()), /tick this box/);

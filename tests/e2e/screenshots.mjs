@@ -9,7 +9,7 @@ import { tmpdir } from "node:os";
 import { join, resolve } from "node:path";
 import { createInterface } from "node:readline";
 import { promisify } from "node:util";
-import { Participant, playing, press, result } from "./browser.mjs";
+import { Participant, passGate, playing, press, result } from "./browser.mjs";
 
 /** @import { Page } from "playwright-core" */
 
@@ -83,6 +83,7 @@ function invitation(url, study) {
  */
 async function enter(page, link) {
   await page.goto(link);
+  await passGate(page);
   await page.locator("[name=read]").check();
   await page.getByRole("button", { name: "I agree, start" }).click();
   await page.waitForURL(/\/p\//);
@@ -200,6 +201,7 @@ await served(async (url, hatlab) => {
   await Participant.with("pictures", artefacts, async (who) => {
     const page = await who.tab();
     await page.goto(`${url}/s/parent-child`);
+    await passGate(page);
     await picture(page, "consent");
     await enter(page, invitation(url, "traffic-junction"));
     await picture(page, "instructions");

@@ -1,5 +1,6 @@
 """The command line as a user types it: exit codes, one-line refusals, and what init leaves behind."""
 
+import csv
 import shutil
 import socket
 import subprocess
@@ -12,6 +13,10 @@ import typer
 from typer.core import TyperGroup
 
 from server.cli import MODELS_COMMANDS
+from server.services import enrol
+from server.services.lab import Lab
+from server.settings import Settings
+from tests.server.services.steps import DESKTOP, prolific
 
 REPOSITORY = Path(__file__).parents[2]
 PASSWORD = "correct horse"
@@ -86,7 +91,14 @@ def test_a_password_from_the_environment_is_not_printed(hatlab: Shell) -> None:
         (("serve", "--port", "abc"), "--port"),
         (("serve",), "run `hatlab init`"),
         (("verify",), "run `hatlab init`"),
+        (("invite", "parent-child", "--count", "1"), "run `hatlab init`"),
+        (("invite", "parent-child"), "either --names FILE or --count N"),
+        (("invite", "parent-child", "--count", "1", "--names", "x"), "either --names FILE or --count N"),
         (("export", "parent-child", "--out", "x"), "run `hatlab init`"),
+        (("erase", "parent-child"), "name one person"),
+        (("erase", "parent-child", "--participant", "P1", "--marketplace", "m"), "name one person"),
+        (("erase", "parent-child", "--external-id", "ada"), "name one person"),
+        (("erase", "parent-child", "--participant", "P1"), "run `hatlab init`"),
         (("simulate", "parent-child", "--participants", "1", "--seed", "1"), "run `hatlab init`"),
     ],
 )
@@ -104,6 +116,8 @@ def test_bad_input_is_one_line_and_exit_code_2(hatlab: Shell, words: tuple[str, 
         ("HATLAB_TRIAL_CACHE", "-1"),
         ("HATLAB_ADMIN_PASSWORD", "short"),
         ("HATLAB_DATABASE_URL", "mysql://x/y"),
+        ("HATLAB_MTURK_ENDPOINT", "nowhere"),
+        ("HATLAB_MTURK_EXTRA_HOST", "http://localhost:8100; script-src *"),
         ("HATLAB_DATABASE_URL", "secret-typed-in-the-wrong-place"),
     ],
 )
@@ -116,10 +130,76 @@ def test_a_setting_that_cannot_be_used_is_named_but_not_repeated(
     assert value not in done.stderr
 
 
+def test_a_list_becomes_links_that_a_spreadsheet_opens_without_harm(initialised: Shell) -> None:
+    (initialised.folder / "class.txt").write_bytes("\ufeffÄda\r\n\r\n=cmd()\r\n".encode())
+    out = initialised.folder / "links.csv"
+    done = initialised("invite", "parent-child", "--names", "class.txt", "--out", str(out))
+    assert (done.returncode, done.stdout) == (0, f"2 links: {out}\n"), done.stderr
+    header, *rows = csv.reader(out.read_text("utf-8").splitlines())
+    assert header == ["name", "link"]
+    assert [name for name, _ in rows] == ["Äda", "'=cmd()"]
+    printed = initialised("invite", "parent-child", "--names", "class.txt").stdout.splitlines()
+    assert [line.split("\t")[1] for line in printed] == [link for _, link in rows]
+    assert all("/s/parent-child?invite=" in line for line in printed)
+    drawn = [initialised("invite", "parent-child", "--count", "3").stdout.splitlines() for _ in range(2)]
+    assert len({line for lines in drawn for line in lines}) == 6
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [("Ada\nAda\n", "stands there twice"), ("x" * 65, "cannot be a name"), (None, "cannot read")],
+)
+def test_a_list_that_cannot_be_used_is_refused(initialised: Shell, content: str | None, said: str) -> None:
+    if content is not None:
+        (initialised.folder / "class.txt").write_text(content)
+    done = initialised("invite", "parent-child", "--names", "class.txt")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert said in done.stderr
+    assert initialised("invite", "nobody", "--count", "1").returncode == 2
+
+
+def test_the_fake_mturk_says_what_to_set_and_stops_when_told(hatlab: Shell) -> None:
+    with hatlab.started("fake-mturk", "--port", "0") as fake:
+        assert fake.stdout is not None
+        first, *rest = (fake.stdout.readline().strip() for _ in range(5))
+        told = dict(line.split("=", 1) for line in rest)
+        assert set(told) == {
+            f"HATLAB_{name.upper()}" for name in Settings.model_fields if name.startswith("mturk_")
+        }
+        settings = Settings(**{name.removeprefix("HATLAB_").lower(): value for name, value in told.items()})
+        assert first.endswith(f"{settings.mturk_extra_host}/")
+        assert "There is nothing to do" in httpx.get(f"{settings.mturk_endpoint}/", timeout=60).text
+        fake.terminate()
+        _, errors = fake.communicate(timeout=60)
+    assert errors == ""
+
+
 def test_an_unknown_study_is_named(initialised: Shell) -> None:
     done = initialised("export", "nobody", "--out", "x")
     assert done.returncode == 2
     assert "nobody" in done.stderr
+
+
+def test_erasing_a_person_asks_first_and_says_if_there_is_nobody(initialised: Shell) -> None:
+    hatlab = initialised
+    words = ("erase", "traffic-junction", "--marketplace", "prolific", "--external-id", "ada")
+    nobody = hatlab(*words)
+    assert nobody.returncode == 2
+    assert nobody.stdout == ""
+    assert nobody.stderr == "hatlab: nobody in traffic-junction is known under that id of prolific\n"
+    lab = Lab.without_agents(Settings(database_url=hatlab.settings["HATLAB_DATABASE_URL"]))
+    with lab.database.writing() as db:
+        enrol.consent(db, lab, "traffic-junction", prolific("ada"), agree=False, device=DESKTOP)
+    lab.database.close()
+    unsure = hatlab(*words)
+    assert unsure.returncode == 130, "nobody answered the question"
+    done = hatlab(*words, "--yes")
+    assert done.returncode == 0, done.stderr
+    assert "the note that they declined" in done.stdout
+    assert "deleted" in done.stdout
+    assert hatlab(*words).returncode == 2
+    assert hatlab("verify").returncode == 0
 
 
 def test_a_port_that_is_taken_is_said_before_anything_starts(initialised: Shell) -> None:
@@ -191,7 +271,18 @@ def test_every_command_of_the_science_is_mounted() -> None:
 def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:
     done = hatlab("--help")
     assert done.returncode == 0, done.stderr
-    for command in ("init", "serve", "verify", "export", "simulate", "fake-prolific", *MODELS_COMMANDS):
+    for command in (
+        "init",
+        "serve",
+        "verify",
+        "export",
+        "erase",
+        "simulate",
+        "fake-prolific",
+        "invite",
+        "fake-mturk",
+        *MODELS_COMMANDS,
+    ):
         assert command in done.stdout
 
 

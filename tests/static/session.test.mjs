@@ -157,3 +157,17 @@ test("roads come once a round and are kept for the steps", async () => {
   const next = await session.decide(driverView(), 0, TIMING);
   assert.deepEqual(next?.role === "driver" ? next.roads : null, roads);
 });
+
+test("a page of questions in between does not bring back the end of a round that was left", async () => {
+  const storage = new FakeStorage();
+  const before = page([{ status: 200, body: { page: "/p/k" } }], storage);
+  await before.session.open(7);
+  const after = page([{ status: 200, body: parentView({ round: 8 }) }], storage);
+  const view = await after.session.open(null);
+  assert.deepEqual(after.requests[0]?.body, { after: 7 });
+  assert.equal(view?.resumed, false);
+  storage.broken = true;
+  const blind = page([{ status: 200, body: parentView() }], storage);
+  await blind.session.open(null);
+  assert.deepEqual(blind.requests[0]?.body, { after: null });
+});

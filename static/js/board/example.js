@@ -58,7 +58,7 @@ export const SEARCHES = {
     { said: 8, walk: walk([6, 5], "left", "up", "left", "up", "left", "up", "left") },
   ],
   child: [
-    { said: 9, walk: walk([6, 2], "up", "right", "up", "right", "right", "up", "right", "up", "right") },
+    { said: 9, walk: walk([5, 2], "right", "up", "right", "right", "up", "right", "up", "right") },
     { said: 5, walk: walk([6, 6], "up", "left", "up", "up", "left", "up", "left", "up") },
   ],
 };

@@ -3,6 +3,7 @@
 
 import { h, round } from "./drawing.js";
 import { figure } from "./symbols.js";
+import { token } from "./tokens.js";
 
 /** @import { Cell, ParentView, ChildView, Drawing } from "../lib/types.js" */
 
@@ -59,6 +60,65 @@ export function replayBoard(view, steps) {
     square(view.size, parent, view.vision),
     ...people(view.size, parent, view.cell, found),
   ]);
+}
+
+/**
+ * The empty board with marks of signs on it (the probe of the signs), and a cursor while one is being placed.
+ * @param {{ size: number, marks: { number: number, cell: Cell }[], picked: number | null, cursor: Cell | null }} probe
+ */
+export function markBoard({ size, marks, picked, cursor }) {
+  const told = marks.map(({ number, cell }) => `Sign ${number} at ${at(cell)}.`).join(" ");
+  return board(size, `Board, ${size} by ${size}. ${told || "No marks yet."}`, [
+    field("seen", size),
+    frame(),
+    ...marks.map((mark) => markOf(size, mark, marks, picked)),
+    cursor && cursorOf(size, cursor),
+  ]);
+}
+
+/**
+ * @param {number} size
+ * @param {{ number: number, cell: Cell }} mark
+ * @param {{ number: number, cell: Cell }[]} marks
+ * @param {number | null} picked
+ * Marks in the same cell share it, side by side.
+ */
+function markOf(size, { number, cell }, marks, picked) {
+  const here = marks.filter((other) => same(other.cell, cell));
+  const rank = here.findIndex((other) => other.number === number);
+  const across = Math.ceil(Math.sqrt(here.length));
+  const u = unit(size) / across;
+  const { x, y } = centre(size, cell);
+  const dx = ((rank % across) - (across - 1) / 2) * u;
+  const dy = (Math.floor(rank / across) - (Math.ceil(here.length / across) - 1) / 2) * u;
+  const scale = Math.round((u / 54) * (here.length === 1 ? 0.9 : 1) * 100) / 100;
+  return h(
+    "g",
+    { transform: `translate(${round(x + dx)} ${round(y + dy)}) scale(${scale})` },
+    token(number, { state: number === picked ? "said" : "" }),
+  );
+}
+
+/**
+ * @param {number} size
+ * @param {Cell} cell
+ */
+function cursorOf(size, cell) {
+  const { x, y } = centre(size, cell);
+  const side = unit(size) - 2;
+  return h("rect", { class: "cursor", x: x - side / 2, y: y - side / 2, width: side, height: side, rx: 3 });
+}
+
+/**
+ * The cell under a point of the board.
+ * @param {number} size
+ * @param {{ x: number, y: number }} point as shares of the board's side, 0 to 1
+ * @returns {Cell}
+ */
+export function cellAt(size, { x, y }) {
+  const index = (/** @type {number} */ share) =>
+    Math.min(size - 1, Math.max(0, Math.floor((share * SIDE - MARGIN) / unit(size))));
+  return [index(y), index(x)];
 }
 
 /** @param {ParentView} view */

@@ -1,27 +1,25 @@
 // @ts-check
 // Full screen, offered and never demanded. A browser leaves it whenever a page follows another one, so the wish is
-// remembered in the tab and fulfilled again between two rounds, never in the middle of one: the board may grow by it.
+// remembered in the tab and fulfilled again between two rounds, never in the middle of one.
 
 const WISH = "hatlab:full-screen";
-/** Whoever leaves a page leaves full screen too, and still wishes it; that page is gone before this has passed. */
-const STAYED_MS = 500;
+const SOON_MS = 500;
+
+/**
+ * @typedef {object} Seams
+ * @property {Document} page
+ * @property {Pick<Storage, "getItem" | "setItem" | "removeItem"> | null} storage of the tab; null where it is forbidden
+ */
 
 export class FullScreen {
-  /**
-   * @param {Document} page
-   * @param {Pick<Storage, "getItem" | "setItem" | "removeItem"> | null} storage of the tab; null where it is forbidden
-   * @param {(callback: () => void, ms: number) => unknown} [later]
-   */
-  constructor(page, storage, later = (callback, ms) => setTimeout(callback, ms)) {
+  /** @param {Seams} seams */
+  constructor({ page, storage }) {
     this.page = page;
     this.storage = storage;
-    page.addEventListener("fullscreenchange", () => {
-      if (!this.on) later(() => this.on || this.#wish(false), STAYED_MS);
-    });
   }
 
-  /** Whether this browser can (a frame of another site may not). */
-  get possible() {
+  /** Whether this browser offers it (a frame of another site may not). */
+  get offered() {
     return this.page.fullscreenEnabled === true;
   }
 
@@ -37,23 +35,6 @@ export class FullScreen {
     }
   }
 
-  /** A button was pressed. */
-  async toggle() {
-    this.#wish(!this.on);
-    if (this.on) await this.page.exitFullscreen().catch(() => {});
-    else await this.#enter();
-  }
-
-  /** Fulfils an earlier wish; called where a key or a click has just come, as browsers demand. */
-  async renew() {
-    if (this.possible && this.wished && !this.on) await this.#enter();
-  }
-
-  /** A browser that refuses is not asked why. */
-  async #enter() {
-    await this.page.documentElement.requestFullscreen({ navigationUI: "hide" }).catch(() => {});
-  }
-
   /** @param {boolean} wish */
   #wish(wish) {
     try {
@@ -63,18 +44,43 @@ export class FullScreen {
       // Without storage the wish ends with the page.
     }
   }
+
+  /** The button was pressed. */
+  async toggle() {
+    this.#wish(!this.on);
+    if (this.on) await this.page.exitFullscreen().catch(() => {});
+    else await this.#enter();
+  }
+
+  /** Fulfils an earlier wish; called where a key or a click has just come. */
+  async renew() {
+    if (this.offered && this.wished && !this.on) await this.#enter();
+  }
+
+  async #enter() {
+    await this.page.documentElement.requestFullscreen({ navigationUI: "hide" }).catch(() => {});
+  }
+
+  /**
+   * Keeps a button's word right; whoever leaves by Escape no longer wishes it. A page that is left is not asked.
+   * @param {HTMLElement} button
+   */
+  attach(button) {
+    if (!this.offered) return;
+    button.hidden = false;
+    button.addEventListener("click", () => void this.toggle());
+    this.page.addEventListener("fullscreenchange", () => {
+      button.textContent = this.on ? "Leave full screen" : "Full screen";
+      if (!this.on) setTimeout(() => this.on || this.#wish(false), SOON_MS);
+    });
+  }
 }
 
-/**
- * Shows a button where full screen is possible, and keeps its word right.
- * @param {HTMLElement} button
- * @param {FullScreen} fullScreen
- */
-export function offerFullScreen(button, fullScreen) {
-  if (!fullScreen.possible) return;
-  button.hidden = false;
-  button.addEventListener("click", () => void fullScreen.toggle());
-  fullScreen.page.addEventListener("fullscreenchange", () => {
-    button.textContent = fullScreen.on ? "Leave full screen" : "Full screen";
-  });
+/** The tab's storage, or null where reading it throws. */
+export function tabStorage() {
+  try {
+    return globalThis.sessionStorage;
+  } catch {
+    return null;
+  }
 }

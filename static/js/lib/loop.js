@@ -1,39 +1,32 @@
 // @ts-check
-// Pictures one after the other, again and again, until paused. The timers come in, so that a fake clock can test it.
+// Pictures one after the other, again and again, with a pause. Timers come in, so that a fake clock can test it.
 
 /** @template Picture @typedef {{ picture: Picture, ms: number }} Frame */
-
-/** @type {{ set: (callback: () => void, ms: number) => any, clear: (timer: any) => void }} */
-const BROWSER = { set: (callback, ms) => setTimeout(callback, ms), clear: (timer) => clearTimeout(timer) };
 
 /** @template Picture */
 export class Loop {
   #at = 0;
-  /** @type {any} */ #timer = null;
+  /** @type {unknown} */ #timer = null;
 
   /**
-   * Draws the first picture at once.
-   * @param {Frame<Picture>[]} frames at least one
+   * @param {Frame<Picture>[]} frames
    * @param {(picture: Picture) => void} draw
-   * @param {typeof BROWSER} [timers]
+   * @param {{ set: (callback: () => void, ms: number) => unknown, clear: (timer: any) => void }} timers
    */
-  constructor(frames, draw, timers = BROWSER) {
+  constructor(frames, draw, timers = { set: (f, ms) => setTimeout(f, ms), clear: (timer) => clearTimeout(timer) }) {
     this.frames = frames;
     this.draw = draw;
     this.timers = timers;
-    draw(this.#frame.picture);
+    this.#show();
   }
 
   get playing() {
     return this.#timer !== null;
   }
 
-  get #frame() {
-    return /** @type {Frame<Picture>} */ (this.frames[this.#at]);
-  }
-
   play() {
-    if (!this.playing) this.#wait();
+    if (this.playing) return;
+    this.#wait();
   }
 
   /** Stops at the picture that is there. */
@@ -45,8 +38,13 @@ export class Loop {
   #wait() {
     this.#timer = this.timers.set(() => {
       this.#at = (this.#at + 1) % this.frames.length;
-      this.draw(this.#frame.picture);
+      this.#show();
       this.#wait();
-    }, this.#frame.ms);
+    }, this.frames[this.#at]?.ms ?? 1000);
+  }
+
+  #show() {
+    const frame = this.frames[this.#at];
+    if (frame) this.draw(frame.picture);
   }
 }

@@ -36,13 +36,15 @@ export class Session {
 
   /**
    * The round to play; an action that a reload left behind is sent first.
-   * @param {number | null} after the round that was just finished, null on a fresh page
+   * @param {number | null} after the round that was just finished, null on a fresh page: then the last one that was
+   *   left, because a page of questions may have come in between
    * @returns {Promise<(RoundView & Brought) | null>} null: the page is being left
    */
   async open(after) {
     if (!this.#flushed) await this.#flush();
     this.#flushed = true;
-    const answer = await this.#post(this.seams.urls.round, { after });
+    if (after !== null) this.#keep(this.#leftKey, String(after));
+    const answer = await this.#post(this.seams.urls.round, { after: after ?? this.#left() });
     const view = this.#viewOf(answer);
     return view && this.#brought(view, after === null && this.#wasSeen(view));
   }
@@ -66,11 +68,33 @@ export class Session {
 
   /** @param {RoundView} view The picture is on screen: a reload from here on is a second look. */
   shown(view) {
+    this.#keep(this.#seenKey, `${view.round}:${view.seq}`);
+  }
+
+  /**
+   * @param {string} key
+   * @param {string} value
+   */
+  #keep(key, value) {
     try {
-      this.seams.storage?.setItem(this.#seenKey, `${view.round}:${view.seq}`);
+      this.seams.storage?.setItem(key, value);
     } catch {
-      // Storage forbidden: the server still knows that the round was open.
+      // Storage forbidden: the server still knows which round is open.
     }
+  }
+
+  /** The last round whose end the person has left. */
+  #left() {
+    try {
+      const kept = this.seams.storage?.getItem(this.#leftKey) ?? "";
+      return /^\d{1,6}$/.test(kept) ? Number(kept) : null;
+    } catch {
+      return null;
+    }
+  }
+
+  get #leftKey() {
+    return `hatlab:left:${this.seams.urls.page}`;
   }
 
   get #seenKey() {

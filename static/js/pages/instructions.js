@@ -1,21 +1,17 @@
 // @ts-check
-// How to play: an example that plays by itself, full screen for who wants it, and the keys of the role, tried before the
-// first round (a tablet has none).
+// How to play: an example that plays by itself, and the keys of the role, tried before the first round.
 
 import { build } from "../board/drawing.js";
 import { exampleFrames } from "../board/example.js";
 import { icon } from "../board/symbols.js";
+import { startBar } from "../lib/bar.js";
 import { el, find } from "../lib/dom.js";
-import { FullScreen, offerFullScreen } from "../lib/fullscreen.js";
 import { keyName } from "../lib/keys.js";
 import { Loop } from "../lib/loop.js";
-import { tabStorage } from "../lib/storage.js";
 import { watchViewport } from "../lib/viewport.js";
 import { watchWindow } from "../lib/watch.js";
 
-/** @import { Example } from "../board/example.js" */
-
-/** @type {{ events_url: string, page: string } & Example} */
+/** @type {{ events_url: string, page: string } & import("../board/example.js").Example} */
 const data = JSON.parse(find("#page-data").textContent ?? "{}");
 const { role } = data;
 const probe = find("#probe");
@@ -54,12 +50,13 @@ function received() {
   probe.classList.remove("probe-open");
 }
 
-/** Plays by itself, unless the person wants little motion: then a still picture, until asked for. */
+/** Plays by itself, unless the person wants little motion: then a still picture and a button. */
 function showExample() {
   const picture = find("#example-picture");
   const loop = new Loop(exampleFrames(data), (drawing) => picture.replaceChildren(build(drawing)));
   const button = find("#example-play");
-  let begun = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  let begun = !still;
   const word = () => {
     button.textContent = loop.playing ? "Pause" : begun ? "Play" : "Show the example";
   };
@@ -69,13 +66,13 @@ function showExample() {
     else loop.play();
     word();
   });
-  if (begun) loop.play();
-  word();
   button.hidden = false;
+  if (!still) loop.play();
+  word();
 }
 
 showExample();
-offerFullScreen(find("#full-screen"), new FullScreen(document, tabStorage()));
+startBar();
 watchWindow(data.events_url, data.page);
 watchViewport(window, (small) => {
   find("#cover").hidden = !small;

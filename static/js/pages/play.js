@@ -5,11 +5,11 @@ import { initJsPsych } from "jspsych";
 import { build } from "../board/drawing.js";
 import { pips } from "../board/meters.js";
 import { Attention } from "../lib/attention.js";
+import { startBar } from "../lib/bar.js";
 import { el, find } from "../lib/dom.js";
-import { FullScreen } from "../lib/fullscreen.js";
 import { Outbox, pageStorage } from "../lib/outbox.js";
+import { roundsOver, Winnings } from "../lib/progress.js";
 import { Session } from "../lib/session.js";
-import { tabStorage } from "../lib/storage.js";
 import { sayIn, setAside } from "../lib/strip.js";
 import { openChannel, takeTurn } from "../lib/tabs.js";
 import { Transport } from "../lib/transport.js";
@@ -21,8 +21,10 @@ import { TrafficJunctionPlugin } from "../plugins/traffic-junction.js";
 
 /** @import { Brought, Message, RoundView, Timing } from "../lib/types.js" */
 
-/** @type {{ round_url: string, step_url: string, page_url: string, events_url: string, page: string }} */
-const urls = JSON.parse(find("#page-data").textContent ?? "{}");
+/** @typedef {{ round_url: string, step_url: string, page_url: string, events_url: string, page: string }} Urls */
+/** @type {Urls & { rounds: number, blocks: number, won: number, bonuses: string[] }} */
+const data = JSON.parse(find("#page-data").textContent ?? "{}");
+const urls = data;
 const strip = find("#strip");
 const attention = new Attention().watch(document);
 const transport = new Transport();
@@ -56,8 +58,18 @@ function head({ phase, number, of }) {
   find("#pips").replaceChildren(...(phase === "practice" ? [] : [build(pips(number, of))]));
 }
 
-const fullScreen = new FullScreen(document, tabStorage());
-watchWindow(urls.events_url, urls.page);
+const bar = startBar();
+const winnings = new Winnings(data.won);
+watchWindow(data.events_url, data.page);
+
+/**
+ * The bar, once a round has ended: after the picture, so that nothing delays it.
+ * @param {RoundView} now
+ */
+function tellBar(now) {
+  const left = data.rounds * data.blocks - roundsOver(now, data.rounds);
+  setTimeout(() => bar.tell(left, data.bonuses[winnings.count(now)]));
+}
 
 /** Connection lost: the board dims, the keys are flat, the strip counts down to the next try. */
 transport.addEventListener("lost", (event) => {
@@ -118,6 +130,7 @@ watchViewport(window, (small) => {
 async function decide(action, timing, about) {
   const next = await session.decide(about, action, timing);
   view = next;
+  if (next?.over) tellBar(next);
   return next;
 }
 
@@ -126,7 +139,7 @@ async function decide(action, timing, about) {
  * @param {RoundView} finished
  */
 async function proceed(finished) {
-  void fullScreen.renew();
+  void bar.fullScreen.renew();
   view = await session.open(finished.round);
 }
 

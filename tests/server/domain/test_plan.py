@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from server.domain.plan import has_left, missing, permutation, plan
+from server.domain.plan import forms_of, has_left, missing, permutation, plan
 from tests.fakes import definition
 
 SEEDS = st.integers(0, 2**53 - 1)
@@ -44,6 +44,38 @@ def test_a_session_has_its_pages_and_rounds_in_order() -> None:
     ]
     assert [r.round for r in mine.rounds if r.last] == [21, 42]
     assert mine.page_after("complete") == "complete"
+
+
+def test_a_whole_study_has_its_pages_in_order() -> None:
+    mine = plan(definition("parent-child", whole=True), "child-parent", 5)
+    assert mine.pages == (
+        *("instructions:1", "practice:1", "quiz:1", "play:1", "survey:1"),
+        *("instructions:2", "practice:2", "quiz:2", "play:2", "survey:2"),
+        *("probe:0", "survey:0", "complete"),
+    )
+    assert [r.phase for r in mine.of_page("practice:1")] == ["practice"]
+    assert {r.phase for r in mine.of_page("play:1")} == {"main"}
+    assert mine.of_page("quiz:1") == mine.of_page("survey:0") == ()
+    drive = definition("traffic-junction", whole=True)
+    assert plan(drive, "driver", 5).pages == (
+        *("instructions:1", "practice:1", "quiz:1", "play:1", "survey:1"),
+        *("survey:0", "complete"),
+    )
+
+
+def test_whoever_finishes_has_handed_in_every_form_of_the_study() -> None:
+    whole = definition("parent-child", whole=True)
+    assert sorted(forms_of(whole, plan(whole, "parent-child", 1))) == sorted(
+        [
+            *("quiz:1", "quiz:2", "attention:2", "attention:4", "tlx:1", "tlx:2", "probe:0"),
+            *("trust:0", "demographics:0", "comment:0"),
+        ]
+    )
+
+
+def test_without_practice_the_quiz_follows_the_instructions() -> None:
+    pages = plan(definition("traffic-junction", whole=True, practice_rounds=0), "driver", 1).pages
+    assert pages[:3] == ("instructions:1", "quiz:1", "play:1")
 
 
 def test_without_practice_the_first_round_counts() -> None:

@@ -33,6 +33,60 @@ def test_the_packaged_studies_are_the_papers(slug: str) -> None:
     assert any("must replace it" in paragraph for paragraph in packaged.texts.consent)
 
 
+@pytest.mark.parametrize("slug", ["parent-child", "traffic-junction"])
+def test_a_packaged_study_pays_nine_pounds_an_hour_or_more_and_its_caps_hold_everybody(slug: str) -> None:
+    packaged = study.read(values(slug))
+    pay = packaged.pay
+    assert pay is not None
+    assert pay.currency == "GBP"
+    assert pay.reward_minor * 60 / packaged.duration_min >= 900
+    assert pay.bonus_max_minor == pay.bonus_success_minor * packaged.main_rounds
+    assert pay.cap_study_minor >= pay.cap_participant_minor * packaged.places
+
+
+@pytest.mark.parametrize("slug", ["parent-child", "traffic-junction"])
+def test_a_packaged_study_asks_about_every_role_and_checks_attention_twice(slug: str) -> None:
+    packaged = study.read(values(slug))
+    for role in packaged.roles:
+        assert len(packaged.quiz_of(role)) >= 3  # type: ignore[arg-type]
+    assert {question.answer for question in packaged.quiz} == {1, 2, 3}
+    assert [check.after for check in packaged.attention] == {
+        "parent-child": [12, 28],
+        "traffic-junction": [7, 14],
+    }[slug]
+    assert (packaged.quiz_tries, packaged.attention_failures) == (2, 2)
+    assert packaged.token_probe == (slug == "parent-child")
+
+
+@pytest.mark.parametrize("slug", ["parent-child", "traffic-junction"])
+def test_the_load_index_has_six_scales_of_21_values(slug: str) -> None:
+    [asked] = study.read(values(slug)).questionnaires_at("block")
+    assert asked.key == "tlx"
+    assert [item.key for item in asked.items] == [
+        "mental",
+        "physical",
+        "temporal",
+        "performance",
+        "effort",
+        "frustration",
+    ]
+    assert all(item.values == tuple(str(value) for value in range(0, 101, 5)) for item in asked.items)
+    assert {(item.low, item.high) for item in asked.items} == {
+        ("Very low", "Very high"),
+        ("Perfect", "Failure"),
+    }
+
+
+@pytest.mark.parametrize("slug", ["parent-child", "traffic-junction"])
+def test_a_packaged_study_says_what_it_records_and_what_declining_leaves(slug: str) -> None:
+    texts = study.read(values(slug)).texts
+    said = " ".join(texts.consent)
+    for words in ("answers to the questions", "in front", "scrambled form", "that fact and the date"):
+        assert words in said
+    assert "scrambled form" in texts.declined
+    assert "the date" in texts.declined
+
+
 def test_a_launched_version_reads_back_as_the_same_text() -> None:
     packaged = definition("traffic-junction")
     again = study.from_json(packaged.canonical)

@@ -18,8 +18,15 @@ NAMED_IN_THE_ISSUE = {
     "steps": "trial_id seq role action rt_ms onset_ms response_ms handler_lag_ms is_trusted refresh_hz row "
     "col messages_heard messages_drawn triangle_max board_px early_keys wait_ms rt_valid",
     "participants": "participant arm role_order token_permutation marketplace device browser viewport "
-    "consented_utc finished_utc status completion_code",
+    "consented_utc finished_utc status completion_code attention_failed excluded exclusion_reason won "
+    "bonus_minor currency reward_minor erased",
     "agents": "trial_id seq step seat action token gate cell source",
+    "answers": "study study_version mode participant arm form block attempt item value label correct "
+    "first_ms last_ms changes answered_utc",
+    "probe": "participant arm communication sign position token row column probability best distance least",
+    "browser_events": "participant visit seq page kind value at_ms stored_utc",
+    "journey": "participant seq event state source stored_utc",
+    "flow": "study mode arm stage people",
     "codebook": "table column type unit meaning",
 }
 

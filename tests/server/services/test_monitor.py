@@ -7,6 +7,8 @@ from itertools import product
 import pytest
 
 from server.domain import canonical
+from server.domain.participation import ENDS
+from server.domain.plan import plan
 from server.services import monitor, studies
 from server.services.lab import Lab
 from server.services.monitor import MODES, ago, where
@@ -54,7 +56,17 @@ def test_every_count_is_the_number_of_people_of_that_kind(lab: Lab, study_id: in
             MODES,
             ("prototype", "one-hot"),
             ("parent-child", "child-parent"),
-            (("active", None), ("active", long_ago), ("finished", long_ago), ("abandoned", None)),
+            (
+                ("active", None),
+                ("active", long_ago),
+                ("finished", long_ago),
+                ("withdrawn", None),
+                ("timed_out", None),
+                ("returned", long_ago),
+                ("rejected", None),
+                ("failed", long_ago),
+                ("screened_out", None),
+            ),
         )
     )
     people = []
@@ -75,7 +87,9 @@ def test_every_count_is_the_number_of_people_of_that_kind(lab: Lab, study_id: in
             finished = sum(p["status"] == "finished" for p in mine)
             active = sum(p["status"] == "active" and p["last_seen_utc"] > long_ago for p in mine)
             assert (arm.people.finished, arm.people.active) == (finished, active)
-            assert arm.people.left == len(mine) - finished - active
+            excluded = sum(p["status"] in {"failed", "screened_out"} for p in mine)
+            assert arm.people.excluded == excluded
+            assert arm.people.left == len(mine) - finished - active - excluded
             assert dict(arm.orders) == Counter(p["role_order"] for p in mine)
             assert dict(arm.devices) == Counter(p["device"] for p in mine)
             assert arm.free == arm.places - finished - active
@@ -159,9 +173,35 @@ def test_times_are_told_in_one_unit(seconds: int, text: str) -> None:
 
 
 def test_pages_have_names_that_people_know() -> None:
-    assert [where(page) for page in ("instructions:1", "play:2", "complete", "quiz:1")] == [
-        "How to play, block 1",
-        "Rounds, block 2",
-        "Completion page",
-        "Quiz, block 1",
-    ]
+    words = {
+        "instructions:1": "How to play, block 1",
+        "practice:1": "Practice, block 1",
+        "quiz:1": "Quiz, block 1",
+        "play:2": "Rounds, block 2",
+        "survey:2": "Questionnaire, block 2",
+        "probe:0": "What the signs mean",
+        "survey:0": "Questionnaire",
+        "complete": "Completion page",
+    }
+    assert {page: where(page) for page in words} == words
+
+
+def test_every_page_of_a_whole_study_has_a_name() -> None:
+    for slug in ("parent-child", "traffic-junction"):
+        study = definition(slug, whole=True)
+        for page in plan(study, study.role_orders[0], 1).pages:
+            assert where(page)
+
+
+def test_every_end_is_counted_and_listed_under_exactly_one_heading() -> None:
+    listed = [standing for standings in monitor.SHOWS.values() for standing in standings]
+    assert sorted(listed) == sorted({"active", "away", *ENDS} - {"declined"})
+
+
+@pytest.mark.parametrize(("show", "status"), [("left", "returned"), ("excluded", "failed")])
+def test_whoever_came_to_an_end_is_listed_there(lab: Lab, study_id: int, show: str, status: str) -> None:
+    put(lab, study_id, 1, status=status)
+    put(lab, study_id, 2)
+    with lab.database.reading() as db:
+        [line] = monitor.people(db, lab, studies.find(db, SLUG), "live", show)
+    assert (line.id, line.standing) == ("P0000000001", status)

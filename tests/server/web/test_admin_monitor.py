@@ -2,15 +2,18 @@
 
 import csv
 import io
+import re
 import zipfile
 from dataclasses import replace
 
 import pytest
 
+from server.services import enrol, leave
 from server.services.lab import Lab
+from server.storage import participants
 from server.storage.database import Database
 from tests.fakes import fake_lab
-from tests.server.services.steps import come_in
+from tests.server.services.steps import DESKTOP, come_in, prolific
 from tests.server.web.admin_site import Experimenter, admin_app, with_account
 
 
@@ -41,6 +44,55 @@ def test_people_are_counted_by_kind_of_data(site: Lab, person: Experimenter) -> 
     )
     assert "Playing 1" in page
     assert "How to play, block 1" in page
+
+
+def test_the_flow_is_drawn_with_everybody_in_it(site: Lab, person: Experimenter) -> None:
+    come_in(site, "parent-child", "ada")
+    key = come_in(site, "parent-child", "grace")
+    with site.database.writing() as db:
+        leave.withdraw(db, site, enrol.participant_by_key(db, site, key), keep=True)
+        enrol.consent(db, site, "parent-child", prolific("eve"), agree=False, device=DESKTOP)
+        enrol.screen_out(db, site, "parent-child", prolific("phone"))
+    page = " ".join(person.get("/admin/studies/parent-child/monitor?mode=test&show=left").text.split())
+    flow = page[page.index('class="consort"') : page.index("Over all versions")]
+    numbers = re.findall(r'class="node"><span>([^<]+)</span> <b class="tnum">(\d+)</b>', flow)
+    assert numbers == [
+        ("Known to have opened the link", "4"),
+        ("Consented, and allocated to an arm", "2"),
+        ("Went through everything", "0"),
+        ("Analysed", "0"),
+    ]
+    for lost in ("1</span> declined", "1</span> device did not fit", "1</span> withdrew", "1</span> still"):
+        assert lost in flow
+    assert "timed out" not in flow
+    assert "<dt>Did not enter</dt><dd>2 " in page
+    assert "<span>Withdrew</span>" in page
+    assert "Left 1<" in page
+    only_live = person.get("/admin/studies/parent-child/monitor?mode=live").text
+    assert "still taking part" not in only_live
+
+
+def test_everybody_at_an_end_has_words_on_the_page(site: Lab, person: Experimenter) -> None:
+    names = {
+        "withdrawn": "Withdrew",
+        "timed_out": "Timed out",
+        "returned": "Returned",
+        "rejected": "Rejected there",
+        "failed": "Attention",
+        "screened_out": "Quiz",
+        "finished": "Finished",
+    }
+    for number, status in enumerate(names):
+        key = come_in(site, "traffic-junction", f"p{number}")
+        with site.database.writing() as db:
+            who = enrol.participant_by_key(db, site, key)
+            participants.end(db, who.id, status, who.page, None, None, site.now_utc())
+    pages = "".join(
+        person.get(f"/admin/studies/traffic-junction/monitor?mode=test&show={show}").text
+        for show in ("finished", "left", "excluded")
+    )
+    for word in names.values():
+        assert f"<span>{word}</span>" in pages
 
 
 def test_the_monitor_of_a_draft_says_that_nobody_can_be_there(person: Experimenter) -> None:

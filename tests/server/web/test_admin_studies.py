@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from server.domain import canonical
+from server.domain.study import read
 from server.services import studies
 from server.services.lab import Lab
 from server.services.studies import Study
@@ -134,6 +136,39 @@ def test_what_is_wrong_with_a_new_study_is_said_at_the_field(
         ("completion_url", "http://plain.example/{code}", "Begin with https://"),
         ("completion_url", "https://lab.example/done", "Must contain {code}."),
         ("lease_min", "1", "Enter at least 5."),
+        ("quiz_tries", "6", "Enter at most 5."),
+        ("attention_failures", "", "Enter a whole number."),
+        ("texts.language", "English", "Use a language"),
+        ("gate.width_min", "10", "Enter at least 320."),
+        ("codes.failed", "not so", "Use letters, digits, hyphens and underscores, at most 64."),
+        ("pay.reward_minor", "3.20", "Enter a whole number."),
+        ("pay.cap_participant_minor", "10", "Reward and largest bonus are 420 together."),
+        ("pay.cap_study_minor", "", "Fill this in."),
+        ("quiz", "[[quiz]\nkey = 1", "(at line 1, column 7)."),
+        ("quiz", "[[questions]]\nkey = 1", "Only [[quiz]] may stand here, not questions."),
+        ("quiz", 'quiz = "x"', "Begin each part with [[quiz]]."),
+        ("quiz", "[[quiz]]\nkey = 2026-01-01", "There is a date or a time, which no question has."),
+        ("quiz", '[[quiz]]\nkey = "a"\ntext = "b"\noptions = ["c", "d"]', "Question 1, answer: is missing."),
+        (
+            "quiz",
+            '[[quiz]]\nkey = "a"\nrole = "child"\ntext = "b"\noptions = ["c", "d"]\nanswer = 1',
+            "Question 1, role: nobody plays the child in traffic_junction.",
+        ),
+        (
+            "attention",
+            '[[attention]]\nkey = "a"\nafter = 99\ntext = "b"\noptions = ["c", "d"]\nanswer = 1',
+            "Check 1, after: a session has only 20 main rounds.",
+        ),
+        (
+            "questionnaires",
+            '[[questionnaires]]\nkey = "a"\ntitle = "b"\n\n[[questionnaires.items]]\nkey = "c"\ntext = "d"',
+            "Questionnaire 1, item 1: a choice needs two options or more, and nothing else has options.",
+        ),
+        (
+            "questionnaires",
+            '[[questionnaires]]\nkey = "quiz"\ntitle = "b"',
+            "Questionnaire 1, items: is missing.",
+        ),
     ],
 )
 def test_a_wrong_field_keeps_its_value_and_gets_a_message(
@@ -161,6 +196,30 @@ def test_a_draft_with_errors_cannot_be_launched(person: Experimenter, draft: str
 def test_every_field_that_is_changed_arrives_in_the_definition(person: Experimenter, draft: str) -> None:
     changes = {
         "title": "Rush hour, again",
+        "attention": "",
+        "quiz": '[[quiz]]\r\nkey = "one"\r\ntext = "1 + 1?"\r\noptions = ["1", "2"]\r\nanswer = 2',
+        "questionnaires": """[[questionnaires]]
+key = "after"
+title = "After"
+when = "block"
+
+[[questionnaires.items]]
+key = "hard"
+text = "How hard was it?"
+kind = "scale"
+maximum = 10
+step = 1
+required = false""",
+        "quiz_tries": "3",
+        "attention_failures": "1",
+        "texts.instructions": "First.\r\n\r\nSecond.",
+        "texts.language": "ar",
+        "texts.direction": "rtl",
+        "gate.width_min": "800",
+        "gate.refresh_min_hz": "12,5",
+        "codes.withdrawn": "BYE",
+        "pay.currency": "EUR",
+        "pay.reward_minor": "150",
         "trials_per_block": "5",
         "practice_rounds": "0",
         "step_limit": "30",
@@ -179,7 +238,7 @@ def test_every_field_that_is_changed_arrives_in_the_definition(person: Experimen
         "situation_seed": "99",
     }
     fields = fields_of(person.get(f"/admin/studies/{draft}").text)
-    del fields["arms.1.overlay"]
+    del fields["arms.1.overlay"], fields["gate.keyboard"]
     answer = person.client.post(f"/admin/studies/{draft}", data=fields | changes | {"action": "save"})
     assert answer.headers["location"] == f"/admin/studies/{draft}?saved=1"
     person.confirm(draft, "launch")
@@ -196,6 +255,81 @@ def test_every_field_that_is_changed_arrives_in_the_definition(person: Experimen
     )
     assert (made.reward_text, made.duration_min, made.lease_min, made.situation_seed) == ("£1.50", 9, 30, 99)
     assert (made.completion_code, made.completion_url) == ("C0DE", "https://lab.example/?cc={code}")
+    assert [(each.key, each.answer) for each in made.quiz] == [("one", 2)]
+    assert (made.quiz_tries, made.attention, made.attention_failures) == (3, (), 1)
+    [after] = made.questionnaires
+    assert (after.when, len(after.items[0].values), after.items[0].required) == ("block", 11, False)
+    assert (made.texts.instructions, made.texts.language, made.texts.direction) == (
+        ("First.", "Second."),
+        "ar",
+        "rtl",
+    )
+    assert (made.gate.width_min, made.gate.refresh_min_hz, made.gate.keyboard) == (800, 12.5, False)
+    assert (made.codes.withdrawn, made.codes.screened_out) == ("BYE", "LOOKED-IN")
+    assert made.pay is not None
+    assert (made.pay.currency, made.pay.reward_minor, made.pay.partial_minor) == ("EUR", 150, 100)
+
+
+def test_nothing_of_a_whole_study_is_lost_by_saving_it_and_every_field_stands_on_the_page(
+    person: Experimenter,
+) -> None:
+    for slug in ("parent-child", "traffic-junction"):
+        before = study(person.lab, slug).definition
+        assert before is not None
+        fields = set(fields_of(person.get(f"/admin/studies/{slug}").text))
+        person.save(slug, {"title": "Another title"})
+        after = study(person.lab, slug).values
+        assert read(after) == before.model_copy(update={"title": "Another title"})
+        leaves = set(before.model_dump()) - {"arms", "texts", "gate", "codes", "pay", "slug", "task"}
+        leaves -= {"environment", "panel_bundle", "arrival", "child_sees_parent", "token_probe"}
+        assert leaves <= fields
+        for group in ("texts", "gate", "codes", "pay"):
+            names = {f"{group}.{name}" for name in getattr(before, group).model_dump()}
+            assert names <= fields, group
+
+
+def test_without_any_amount_a_study_states_no_pay(person: Experimenter, draft: str) -> None:
+    fields = fields_of(person.get(f"/admin/studies/{draft}").text)
+    amounts = {name: "" for name in fields if name.startswith("pay.") and name != "pay.currency"}
+    assert len(amounts) == 7
+    person.save(draft, amounts)
+    assert study(person.lab, draft).values["pay"] is None
+    person.save(draft, {"pay.bonus_max_minor": "5"})
+    assert study(person.lab, draft).values["pay"] == {"currency": "GBP", "bonus_max_minor": "5"}
+
+
+def test_a_text_that_is_no_toml_stays_as_it_was_typed_and_cannot_be_launched(
+    person: Experimenter, draft: str
+) -> None:
+    typed = '[[quiz]]\nkey = "half'
+    assert person.save(draft, {"quiz": typed}).status_code == 422
+    page = person.get(f"/admin/studies/{draft}").text
+    assert fields_of(page)["quiz"] == typed
+    assert 'id="quiz-error"' in page
+    assert '<a href="#questions" class="wrong">' in page
+    assert person.get(f"/admin/studies/{draft}/launch").status_code == 303
+    assert versions(person.lab, draft) == []
+
+
+def test_the_way_of_a_participant_names_every_question(person: Experimenter) -> None:
+    page = person.get("/admin/studies/parent-child").text
+    way = re.findall(
+        r'<span>([^<]+)</span><span class="num">([^<]*)</span>', page[page.index('class="flow"') :]
+    )
+    assert way[:6] == [
+        ("Entry and consent", ""),
+        ("How to play as parent", ""),
+        ("Practice as parent", "1"),
+        ("Quiz", "3"),
+        ("Rounds as parent", "20"),
+        ("Questions about the rounds", "6"),
+    ]
+    assert way[-4:] == [
+        ("Attention checks in between", "2"),
+        ("What the signs mean", ""),
+        ("Last questions", "11"),
+        ("Completion code", ""),
+    ]
 
 
 def test_what_the_child_sees_can_be_turned_off(person: Experimenter) -> None:
@@ -269,7 +403,7 @@ def test_changing_a_launched_study_makes_the_next_version_and_leaves_the_first(
 ) -> None:
     person.confirm(draft, "launch")
     first = versions(person.lab, draft)
-    person.save(draft, {"title": "Rush hour II", "trials_per_block": "3"})
+    person.save(draft, {"title": "Rush hour II", "trials_per_block": "3", "attention": ""})
     assert versions(person.lab, draft) == first
     assert study(person.lab, draft).row.title == "Rush hour"
     assert "Draft of version 2" in person.get(f"/admin/studies/{draft}").text

@@ -35,7 +35,7 @@ def people(lab: Lab) -> int:
 def test_the_consent_page_says_what_the_study_says_and_keeps_the_identifiers(lab: Lab) -> None:
     page = open_study(lab).get(f"/s/{SLUG}", params=prolific())
     assert page.status_code == 200
-    assert "about 15 minutes" in page.text
+    assert "about 20 minutes" in page.text
     assert "Cross the junction" in page.text
     assert hidden_fields(page.text).items() >= prolific().items()
     assert people(lab) == 0
@@ -96,10 +96,11 @@ def test_a_preview_shows_the_study_to_nobody_and_stores_nothing(lab: Lab) -> Non
     assert people(lab) == 0
 
 
-def test_declining_leaves_nothing(lab: Lab) -> None:
+def test_declining_leaves_no_person_and_says_what_is_kept(lab: Lab) -> None:
     client = open_study(lab)
     page = client.post(f"/s/{SLUG}/consent", data={**prolific(), **DEVICE, "agree": "no"})
-    assert "Nothing about you has been kept" in page.text
+    assert "scrambled form" in page.text
+    assert "nothing else about you is kept" in page.text
     assert people(lab) == 0
     assert not client.cookies
 

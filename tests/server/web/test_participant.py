@@ -1,5 +1,7 @@
 """The pages of a session, from instructions to the code, and the way back to the marketplace."""
 
+from dataclasses import replace
+
 import pytest
 
 from server.services.lab import Lab
@@ -99,6 +101,22 @@ def test_a_made_up_submit_host_gets_no_form(client: Client) -> None:
     last = play_all(client, come_in(client, "traffic-junction", evil))
     assert "evil.example" not in last.text
     assert "CROSSED-OVER" in last.text
+
+
+def test_one_more_worker_site_counts_only_where_the_settings_name_it(lab: Lab) -> None:
+    fake = "http://localhost:8100"
+    told = replace(lab, settings=lab.settings.model_copy(update={"mturk_extra_host": fake}))
+    launch(lab, definition("traffic-junction", trials_per_block=1))
+    with_it, without = client_of(told), client_of(lab)
+    worker = {**mturk(), "turkSubmitTo": fake}
+    entry = with_it.get("/s/traffic-junction", params=worker)
+    assert entry.headers["content-security-policy"].endswith(f"https://workersandbox.mturk.com {fake}")
+    address = come_in(with_it, "traffic-junction", worker)
+    last = play_all(with_it, address)
+    assert f'action="{fake}/mturk/externalSubmit"' in last.text
+    assert f"https://workersandbox.mturk.com {fake};" in last.headers["content-security-policy"]
+    elsewhere = without.get(address)
+    assert fake not in elsewhere.text + elsewhere.headers["content-security-policy"]
 
 
 def test_a_page_names_no_arm_bundle_or_seed(client: Client) -> None:

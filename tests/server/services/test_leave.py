@@ -1,0 +1,98 @@
+"""Withdrawing at any stage: at once, for good, and with the data kept or deleted as the person says."""
+
+import pytest
+
+from server.domain.errors import ClosedError
+from server.services import enrol, leave, watch
+from server.services.lab import Lab
+from server.services.play import PageChange
+from server.services.verify import verify
+from server.storage import answers, browser_log, journeys, trials
+from tests.server.services.steps import decide, go_on, open_round, person
+from tests.server.services.walks import asked, at_end, entered, hand_in, on, page, right, walk_to
+
+SLUG = "traffic-junction"
+STAGES = {
+    "consented": on("instructions"),
+    "instructed": on("practice"),
+    "practised": asked("quiz"),
+    "quizzed": on("play"),
+    "playing": asked("attention"),
+    "surveyed": lambda shown: shown.name == "survey:0",
+}
+
+
+def withdraw(lab: Lab, key: str, *, keep: bool) -> None:
+    with lab.database.writing() as db:
+        leave.withdraw(db, lab, enrol.participant_by_key(db, lab, key), keep=keep)
+
+
+def left(lab: Lab, key: str) -> tuple[int, int, int]:
+    """How many rounds, answers and window events there are of a person."""
+    with lab.database.reading() as db:
+        who = enrol.participant_by_key(db, lab, key).id
+        found = (
+            trials.of_participant(db, who),
+            answers.of_participant(db, who),
+            browser_log.of_participant(db, who),
+        )
+    rounds, given, window = (len(rows) for rows in found)
+    return rounds, given, window
+
+
+@pytest.mark.parametrize("keep", [True, False])
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_person_can_withdraw_at_every_stage(lab: Lab, stage: str, keep: bool) -> None:
+    key = entered(lab, SLUG)
+    with lab.database.writing() as db:
+        who = enrol.participant_by_key(db, lab, key)
+        watch.keep(db, lab, who, "visit-0001", "instructions:1", [(0, "loaded", "1280x720", 1.0)])
+    assert walk_to(lab, key, STAGES[stage]).state == stage
+    before = left(lab, key)
+    withdraw(lab, key, keep=keep)
+    shown = page(lab, key)
+    assert (shown.kind, shown.state, shown.code) == ("end", "withdrawn", "LEFT-EARLY")
+    assert shown.data_kept is keep
+    assert left(lab, key) == (before if keep else (0, 0, 0))
+    after = person(lab, key)
+    assert bool(after.erased_utc) is not keep
+    assert (after.device, after.browser) == (("desktop", "Firefox 140") if keep else ("unknown", ""))
+    with lab.database.reading() as db:
+        assert journeys.of_participant(db, after.id)[-1].event == "withdraw"
+    assert verify(lab).clean
+
+
+def test_after_withdrawing_nothing_goes_on_and_nothing_more_is_kept(lab: Lab) -> None:
+    key = entered(lab, SLUG)
+    walk_to(lab, key, on("play"))
+    view = open_round(lab, key)
+    assert isinstance(view, dict)
+    withdraw(lab, key, keep=True)
+    before = left(lab, key)
+    with pytest.raises(ClosedError):
+        decide(lab, key, view, 0)
+    assert isinstance(open_round(lab, key), PageChange)
+    assert go_on(lab, key) == "play:1"
+    hand_in(lab, key, {}, name="attention:1", attempt=1)
+    with lab.database.writing() as db:
+        who = enrol.participant_by_key(db, lab, key)
+        assert watch.keep(db, lab, who, "visit-0002", "play:1", [(0, "blur", "", 1.0)]) == 0
+    assert left(lab, key) == before
+
+
+def test_whoever_has_kept_the_data_cannot_delete_them_by_withdrawing_again(lab: Lab) -> None:
+    key = entered(lab, SLUG)
+    walk_to(lab, key, on("play"))
+    withdraw(lab, key, keep=True)
+    before = left(lab, key)
+    withdraw(lab, key, keep=False)
+    assert left(lab, key) == before
+
+
+def test_whoever_has_finished_stays_finished(lab: Lab) -> None:
+    key = entered(lab, SLUG)
+    walk_to(lab, key, at_end, right)
+    finished = person(lab, key)
+    withdraw(lab, key, keep=False)
+    assert person(lab, key) == finished
+    assert left(lab, key)[0] == 3
