@@ -105,8 +105,7 @@ def shorten(here: Laboratory) -> None:
             values = tomllib.loads((ROOT / "server" / "studies" / f"{template}.toml").read_text())
             arms = [arm for arm in values["arms"] if arm["bundle"] in AGENTS]
             named = {"slug": slug, "arms": arms, "completion_url": PROLIFIC}
-            rounds_only = ROUNDS_ONLY if slug in short else {}
-            definition = study.read(values | rounds_only | changes | named)
+            definition = study.read(values | ROUNDS_ONLY | changes | named)
             made = studies.create(
                 db, lab, definition.model_dump(mode="json"), definition.title, definition.slug
             )
