@@ -33,6 +33,7 @@ async function inside(page, selector) {
  * @returns {Promise<Place>}
  */
 async function typing(page, frame) {
+  await page.locator("#task").evaluate((task) => task.blur()); // else a new page inside gets no keys
   await page.locator("#task").focus();
   return {
     locator: frame.locator.bind(frame),

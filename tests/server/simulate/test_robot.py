@@ -11,8 +11,10 @@ from itsdangerous import TimestampSigner
 
 from server.app import create_app
 from server.domain import canonical
+from server.domain.study import answer_key
 from server.services.export import export
 from server.services.lab import Lab
+from server.services.verify import verify
 from server.simulate import browser as browsers
 from server.simulate.browser import Browser, RobotError
 from server.simulate.crowd import USER_AGENT, Crowd, UnreachableError, quantile, robot, simulate, summary
@@ -49,6 +51,16 @@ def walked(lab: Lab, crowd: Crowd, wrap: Transport = lambda inner: inner) -> lis
         return results
 
     return asyncio.run(walk())
+
+
+@pytest.mark.parametrize("slug", ["parent-child", "traffic-junction"])
+def test_a_robot_walks_a_whole_study_with_all_its_questions(sqlite_database: Database, slug: str) -> None:
+    lab, study = fake_lab(sqlite_database), definition(slug, whole=True, trials_per_block=2)
+    launch(lab, study, mode="test")
+    [result] = walked(lab, Crowd(slug, 1, seed=3, url=URL, answers=answer_key(study)))
+    assert result.error is None
+    assert result.code == study.completion_code
+    assert verify(lab).clean
 
 
 def stored(lab: Lab, key: str) -> list[Step]:

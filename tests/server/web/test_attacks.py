@@ -141,7 +141,7 @@ def test_two_tabs_that_race_to_consent_are_one_person(lab: Lab, client: Client) 
 def test_two_tabs_that_race_to_answer_the_quiz_use_one_try(lab: Lab, client: Client) -> None:
     address = come_in(client, "parent-child")
     while "a.goal" not in (page := client.get(address)).text:
-        if "page-data" in page.text:
+        if "round_url" in page.text:
             play_block(client, address)
         else:
             go_on(client, address)

@@ -49,10 +49,10 @@ HEADINGS = {
 NEXT = {
     State.CONSENTED: 'type="submit">Next</button>',
     State.INSTRUCTED: "round_url",
-    State.PRACTISED: 'type="submit">Continue</button>',
+    State.PRACTISED: 'form="answers">Continue</button>',
     State.QUIZZED: "round_url",
     State.PLAYING: "round_url",
-    State.SURVEYED: 'type="submit">Continue</button>',
+    State.SURVEYED: 'form="answers">Continue</button>',
     State.FINISHED: "FOUND-CHILD</output>",
     State.FAILED: "FOUND-CHILD-2</output>",
     State.SCREENED_OUT: "LOOKED-IN</output>",
