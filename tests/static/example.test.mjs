@@ -93,6 +93,14 @@ test("letters stand inside the picture, and the one of the message beside the si
       }
     }
   }
+  for (const { picture } of frames("parent")) {
+    const c = [...nodes(picture)].find(({ attributes }) => attributes["data-letter"] === "C");
+    const [mark] = classed(/** @type {Drawing} */ (c), "leader-mark");
+    for (const sign of SIGNS.map(onCard)) {
+      const apart = Math.hypot(sign.x - Number(mark?.attributes.cx), sign.y - Number(mark?.attributes.cy));
+      assert.ok(apart > 13 + 10, `the letter hides no sign: ${apart}`);
+    }
+  }
   const card = signCard("", SIGNS, 4);
   const said = classed(card, "said").at(-1);
   const [, x = 0, y = 0] =

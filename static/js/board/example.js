@@ -150,13 +150,19 @@ function parentScene(view, said, down) {
 }
 
 /**
- * A letter beside the sign that is said, towards the middle of the card's edge, where no sign is hidden by it.
+ * A letter beside the sign that is said, on the side where it is farthest from the other signs.
  * @param {string} letter
  * @param {number} number
  */
 function saidBy(letter, number) {
   const { x, y } = onCard(/** @type {Sign} */ (SIGNS[number - 1]));
-  return callout(letter, { x: x + 11, y: y - 11 }, { x: x + 32, y: y - 34 });
+  const others = SIGNS.filter((sign) => sign.number !== number).map(onCard);
+  const sides = [1, -1].flatMap((right) =>
+    [-1, 1].map((down) => ({ right, down, x: x + 32 * right, y: y + 34 * down })),
+  );
+  const free = sides.map((side) => Math.min(...others.map((other) => Math.hypot(other.x - side.x, other.y - side.y))));
+  const side = /** @type {typeof sides[number]} */ (sides[free.indexOf(Math.max(...free))]);
+  return callout(letter, { x: x + 11 * side.right, y: y + 11 * side.down }, side);
 }
 
 /**
