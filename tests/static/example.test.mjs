@@ -101,6 +101,24 @@ test("letters stand inside the picture, and the one of the message beside the si
       assert.ok(apart > 13 + 10, `the letter hides no sign: ${apart}`);
     }
   }
+  for (const { picture } of frames("parent")) {
+    const marks = classed(picture, "leader-mark").map(({ attributes }) => [
+      Number(attributes.cx),
+      Number(attributes.cy),
+    ]);
+    for (const { attributes: key } of classed(picture, "mini-key")) {
+      const [left, top] = [Number(key.x), Number(key.y)];
+      const away = (/** @type {number[]} */ [x = 0, y = 0]) =>
+        Math.hypot(
+          Math.max(left - x, 0, x - left - Number(key.width)),
+          Math.max(top - y, 0, y - top - Number(key.height)),
+        );
+      assert.ok(
+        marks.every((mark) => away(mark) > 13),
+        "no letter hides a key",
+      );
+    }
+  }
   const card = signCard("", SIGNS, 4);
   const said = classed(card, "said").at(-1);
   const [, x = 0, y = 0] =

@@ -55,7 +55,7 @@ export function exampleFrames(example) {
 export const SEARCHES = {
   parent: [
     { said: 4, walk: walk([6, 2], "right", "up", "up", "right", "up", "up", "up") },
-    { said: 8, walk: walk([6, 5], "left", "up", "left", "up", "left", "up", "left") },
+    { said: 6, walk: walk([4, 5], "left", "up", "left", "up", "left", "up", "left") },
   ],
   child: [
     { said: 9, walk: walk([5, 2], "right", "up", "right", "right", "up", "right", "up", "right") },
