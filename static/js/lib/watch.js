@@ -1,67 +1,67 @@
 // @ts-check
-// Joins the window's events to its log. Batches go soon after loading, every few seconds, and when the page is left.
+// Joins the window's events to its log: `watchWindow(eventsUrl, page)`, once, on any page of a session.
 
 import { visitName, WindowLog } from "./windowlog.js";
 
 /** @import { Batch, Kind } from "./windowlog.js" */
 
-const SOON_MS = 500;
-const EVERY_MS = 5000;
 const SETTLED_MS = 300; // a window that is being dragged has many sizes; the one it keeps counts
 
 /**
- * @param {{ events_url: string, page: string }} where
- * @param {Window} [view]
- * @returns {WindowLog} to be flushed where the session may end: after the end the server keeps nothing
+ * Logs what happens to this window until it is left. A page that is loaded without focus or in the background says so.
+ * @param {string} eventsUrl
+ * @param {string} page the page's name in the journey, such as "play:1"
+ * @returns {WindowLog} `leave` it where the session may end: after the end the server keeps nothing
  */
-export function watchWindow({ events_url, page }, view = window) {
+export function watchWindow(eventsUrl, page) {
   const log = new WindowLog({
     page,
     visit: visitName(),
     now: () => performance.now(),
-    send: (batch, keepalive) => post(events_url, batch, keepalive),
+    later: (callback, ms) => setTimeout(callback, ms),
+    send: (batch, leaving) => post(eventsUrl, batch, leaving),
   });
-  const size = () => `${view.innerWidth}x${view.innerHeight}`;
   log.note("loaded", size());
-  listen(view, log, size);
-  setTimeout(() => void log.flush(), SOON_MS);
-  setInterval(() => void log.flush(), EVERY_MS);
+  if (document.visibilityState === "hidden") log.note("hidden");
+  if (!document.hasFocus()) log.note("blur");
+  listen(log);
   return log;
 }
 
-/**
- * @param {Window} view
- * @param {WindowLog} log
- * @param {() => string} size
- */
-function listen(view, log, size) {
-  const page = view.document;
-  for (const kind of /** @type {Kind[]} */ (["focus", "blur"])) view.addEventListener(kind, () => log.note(kind));
-  page.addEventListener("visibilitychange", () => {
-    log.note(page.visibilityState === "hidden" ? "hidden" : "visible");
-    if (page.visibilityState === "hidden") log.leave();
+/** @param {WindowLog} log */
+function listen(log) {
+  for (const kind of /** @type {Kind[]} */ (["focus", "blur"])) window.addEventListener(kind, () => log.note(kind));
+  document.addEventListener("visibilitychange", () => {
+    const hidden = document.visibilityState === "hidden";
+    log.note(hidden ? "hidden" : "visible");
+    if (hidden) void log.leave(); // a phone or a killed tab says no more than this
   });
-  page.addEventListener("fullscreenchange", () => log.note(page.fullscreenElement ? "fullscreen" : "windowed", size()));
+  document.addEventListener("fullscreenchange", () => log.note(document.fullscreenElement ? "fullscreen" : "windowed"));
+  window.addEventListener("pagehide", () => void log.leave());
   /** @type {ReturnType<typeof setTimeout> | undefined} */ let settling;
-  view.addEventListener("resize", () => {
+  window.addEventListener("resize", () => {
     clearTimeout(settling);
     settling = setTimeout(() => log.note("resize", size()), SETTLED_MS);
   });
-  view.addEventListener("pagehide", () => log.leave());
+}
+
+function size() {
+  return `${window.innerWidth}x${window.innerHeight}`;
 }
 
 /**
  * @param {string} url
  * @param {Batch} batch
- * @param {boolean} keepalive
+ * @param {boolean} leaving the request outlives the page
  */
-async function post(url, batch, keepalive) {
+async function post(url, batch, leaving) {
   const response = await fetch(url, {
     method: "POST",
     body: JSON.stringify(batch),
     headers: { "content-type": "application/json" },
     credentials: "same-origin",
-    keepalive,
+    priority: "low",
+    keepalive: leaving,
   });
   return response.status < 500 && response.status !== 408 && response.status !== 429;
 }

@@ -8,4 +8,6 @@ import { watchWindow } from "../lib/watch.js";
 
 new Form();
 startBar();
-watchWindow(JSON.parse(find("#page-data").textContent ?? "{}"));
+/** @type {{ events_url: string, page: string }} */
+const { events_url, page } = JSON.parse(find("#page-data").textContent ?? "{}");
+watchWindow(events_url, page);

@@ -73,7 +73,7 @@ function showExample() {
 
 showExample();
 startBar();
-watchWindow(data);
+watchWindow(data.events_url, data.page);
 watchViewport(window, (small) => {
   find("#cover").hidden = !small;
 });

@@ -60,7 +60,7 @@ function head({ phase, number, of }) {
 
 const bar = startBar();
 const winnings = new Winnings(data.won);
-const windowLog = watchWindow(data);
+const windowLog = watchWindow(data.events_url, data.page);
 
 /**
  * The bar and the window's log, once a round has ended: after the picture, so that nothing delays it.
@@ -70,7 +70,7 @@ function ended(now) {
   const left = data.rounds * data.blocks - roundsOver(now, data.rounds);
   setTimeout(() => {
     bar.tell(left, data.bonuses[winnings.count(now)]);
-    void windowLog.flush();
+    void windowLog.leave(); // the session may end here
   });
 }
 

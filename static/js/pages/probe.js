@@ -135,4 +135,4 @@ form.element.append(told, eraser, panel, el("div", { class: "keys digits" }, ...
 area.hidden = false;
 draw();
 startBar();
-watchWindow(data);
+watchWindow(data.events_url, data.page);
