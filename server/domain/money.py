@@ -1,11 +1,9 @@
 """Money: whole minor units (pence, cents) everywhere; what an end is worth, and how people read it."""
 
-from server.domain.participation import State
+from server.domain.participation import WENT_THROUGH, State
 from server.domain.study import Pay
 
 SIGNS = {"GBP": "£", "USD": "$", "EUR": "€"}
-WENT_THROUGH = frozenset({State.FINISHED, State.FAILED})
-"""Ends of who gets the whole reward and a bonus, attentive or not."""
 
 
 def shown(minor: int, currency: str) -> str:
@@ -26,6 +24,6 @@ def reward_minor(pay: Pay, status: str) -> int:
     )
 
 
-def bonus_minor(pay: Pay, status: str, won: int) -> int:
-    """What so many successes are worth to somebody of this status."""
-    return min(won * pay.bonus_success_minor, pay.bonus_max_minor) if status in WENT_THROUGH else 0
+def bonus_minor(pay: Pay | None, won: int) -> int:
+    """What so many successes are worth, by the study's rule; it is paid to who went through everything."""
+    return min(won * pay.bonus_success_minor, pay.bonus_max_minor) if pay else 0

@@ -82,6 +82,9 @@ STAGES = (
 BEFORE = (State.INVITED, State.SCREENED)
 ENDS = tuple(state for state in State if state not in {*STAGES, *BEFORE})
 
+WENT_THROUGH = frozenset({State.FINISHED, State.FAILED})
+"""Ends of who did everything, attentive or not: they get the whole reward and the bonus."""
+
 ACTIVE = "active"
 """Status of everybody in one of the stages."""
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from server.domain.participation import ACTIVE
+from server.domain.participation import ACTIVE, WENT_THROUGH
 from server.domain.study import Pay
 
 ActionKind = Literal["approve", "bonus", "partial", "screen_out", "ask_return", "follow", "look"]
@@ -20,7 +20,6 @@ MONEY: frozenset[ActionKind] = frozenset({"approve", "bonus", "partial", "screen
 OVER = frozenset({"approved", "partially_approved", "returned", "timed_out", "rejected", "screened_out"})
 GIVEN_BACK = frozenset({"returned", "timed_out", "rejected"})
 PAID = frozenset({"approved", "partially_approved"})
-WENT_THROUGH = frozenset({"finished", "failed"})
 
 
 @dataclass(frozen=True, slots=True)

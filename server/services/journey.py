@@ -1,7 +1,9 @@
 """Moving a participant along: the one place that writes a status, by the table of `domain.participation`."""
 
+from collections.abc import Sequence
+
 from server.domain import participation
-from server.domain.participation import ACTIVE, Event, State
+from server.domain.participation import ACTIVE, WENT_THROUGH, Event, State
 from server.domain.plan import COMPLETE, page_kind
 from server.domain.study import StudyDefinition
 from server.services.lab import Lab
@@ -9,9 +11,9 @@ from server.services.session import Session
 from server.storage import answers, journeys, participants, trials
 from server.storage.database import DbSession
 from server.storage.participants import ParticipantRow
+from server.storage.trials import TrialRow
 
 PARTICIPANT, SERVER = "participant", "server"
-WENT_THROUGH = frozenset({State.FINISHED, State.FAILED})
 LEFT_BY: dict[str, Event] = {
     "instructions": Event.READ,
     "practice": Event.PRACTICE_OVER,
@@ -22,11 +24,15 @@ LEFT_BY: dict[str, Event] = {
 
 def state(db: DbSession, session: Session) -> State:
     """Where the participant stands."""
+    return standing(session, trials.of_participant(db, session.participant.id))
+
+
+def standing(session: Session, rows: Sequence[TrialRow]) -> State:
+    """The same, from the participant's trials."""
     participant = session.participant
     if participant.status != ACTIVE:
         return State(participant.status)
     _, block = page_kind(participant.page)
-    rows = trials.of_participant(db, participant.id)
     begun = any(r.block == block and r.phase == "main" and r.outcome is not None for r in rows)
     return participation.stage_of(participant.page, last_block=block == session.plan.blocks, begun=begun)
 

@@ -6,15 +6,16 @@ A completion code exists only once nothing is missing.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
-from typing import Literal
+from typing import Any, Literal
 
 from server.domain import canonical, events, plan
 from server.domain.errors import CorruptError
 from server.domain.forms import Form
+from server.domain.money import bonus_minor
 from server.domain.participation import ACTIVE, State
 from server.domain.plan import COMPLETE, ROUNDS, page_kind
 from server.domain.study import Role, StudyDefinition
-from server.services import journey
+from server.services import journey, probe
 from server.services.due import due_form
 from server.services.lab import Lab
 from server.services.session import Session, session_of
@@ -61,6 +62,8 @@ class Page:
     practice: bool
     """Only practice rounds are played on this page."""
     form: Form | None
+    signs: Mapping[str, Any] | None
+    """What the probe draws; None on every other page."""
     progress: Progress
     code: str | None
     """To hand in, once an end was reached."""
@@ -74,17 +77,19 @@ def page_of(db: DbSession, lab: Lab, participant: ParticipantRow) -> Page:
     kind, block = page_kind(participant.page)
     form = due_form(db, session) if participant.status == ACTIVE else None
     block = block or session.plan.blocks
+    rows = trials.of_participant(db, participant.id)
     return Page(
         kind=shown_as(participant, form),
         name=participant.page,
-        state=journey.state(db, session),
+        state=journey.standing(session, rows),
         study=session.study,
         role=session.plan.of_block(block)[0].role,
         block=block,
         blocks=session.plan.blocks,
         practice=kind == "practice",
         form=form,
-        progress=progress_of(lab, session, trials.of_participant(db, participant.id)),
+        signs=probe.drawing(lab, session) if form is not None and form.kind == "probe" else None,
+        progress=progress_of(lab, session, rows),
         code=participant.completion_code,
         data_kept=participant.erased_utc is None,
         marketplace=participant.marketplace,
@@ -112,14 +117,8 @@ def progress_of(lab: Lab, session: Session, rows: Sequence[TrialRow]) -> Progres
         rounds=session.study.main_rounds,
         minutes=max(0, (until - began) // timedelta(minutes=1)),
         won=won,
-        bonus_minor=bonus_minor(session.study, won),
+        bonus_minor=bonus_minor(session.study.pay, won),
     )
-
-
-def bonus_minor(study: StudyDefinition, won: int) -> int:
-    """What so many successes are worth, by the study's rule."""
-    pay = study.pay
-    return min(won * pay.bonus_success_minor, pay.bonus_max_minor) if pay else 0
 
 
 def advance(db: DbSession, lab: Lab, participant: ParticipantRow, from_page: str) -> None:

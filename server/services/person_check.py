@@ -9,10 +9,10 @@ from collections.abc import Iterator, Sequence
 
 from server.domain import allocation, canonical, forms, plan
 from server.domain.allocation import Allocated
-from server.domain.participation import ACTIVE, ENDS, State
+from server.domain.participation import ACTIVE, ENDS, WENT_THROUGH, State
 from server.domain.plan import COMPLETE, page_kind
 from server.services import enrol
-from server.services.journey import WENT_THROUGH, code_of
+from server.services.journey import code_of
 from server.services.lab import Lab
 from server.services.session import Session
 from server.storage import answers, enrolments, journeys, studies

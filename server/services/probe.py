@@ -6,11 +6,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from server.domain import canonical
-from server.services import enrol
 from server.services.lab import Lab
-from server.services.session import Session, session_of
+from server.services.session import Session
 from server.storage.answers import AnswerRow
-from server.storage.database import DbSession
 
 if TYPE_CHECKING:
     from models.policies.lexicon import Lexicon
@@ -39,13 +37,8 @@ class Mark(NamedTuple):
     """The same for the best cell that could be marked."""
 
 
-def drawing(db: DbSession, lab: Lab, key: str) -> dict[str, Any]:
-    """Size of the board, and number, glyph and place of every sign, as on the participant's own panel."""
-    session = session_of(db, lab, enrol.participant_by_key(db, lab, key))
-    return {"size": 9, "signs": []} if session.study.panel_bundle is None else panel_data(lab, session)
-
-
-def panel_data(lab: Lab, session: Session) -> dict[str, Any]:
+def drawing(lab: Lab, session: Session) -> dict[str, Any]:
+    """Size of the board, and number and place of every sign, as on the participant's own panel."""
     agent = lab.agent(session.study.panel_bundle or "")
     numbers = canonical.loads(session.participant.number_permutation)
     signs = [

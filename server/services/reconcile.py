@@ -7,15 +7,17 @@ and the purpose, so that it happens once, whoever presses how often and whicheve
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import get_args
 
 from server.domain import canonical, reconciliation
 from server.domain.errors import HatlabError
+from server.domain.money import bonus_minor
 from server.domain.reconciliation import Mismatch, Ours, OverCapError, Theirs
 from server.domain.study import Pay
 from server.recruitment.recruiter import Bonus, Recruiter, RecruiterError, UncertainError
 from server.services import recruit
 from server.services.lab import Lab
-from server.services.pages import WON, bonus_minor
+from server.services.pages import WON
 from server.services.recruit import Place
 from server.services.recruiters import LISTS_EVERYBODY, recruiter
 from server.storage import postings, trials
@@ -70,14 +72,7 @@ def pay_at(place: Place) -> Pay | None:
 
 
 def kind_of(row: PaymentRow) -> reconciliation.ActionKind:
-    known: tuple[reconciliation.ActionKind, ...] = (
-        "approve",
-        "bonus",
-        "partial",
-        "screen_out",
-        "ask_return",
-        "follow",
-    )
+    known: tuple[reconciliation.ActionKind, ...] = get_args(reconciliation.ActionKind)
     return next((kind for kind in known if kind == row.kind), "look")
 
 
@@ -91,7 +86,7 @@ def people(db: DbSession, place: Place) -> list[Ours]:
             row.submission_id or "",
             row.status,
             row.completion_code or "",
-            bonus_minor(place.study, wins.get(row.participant_id, 0)),
+            bonus_minor(place.study.pay, wins.get(row.participant_id, 0)),
         )
         for row in postings.people(db, place.row.study_id, place.row.marketplace, place.mode)
     ]

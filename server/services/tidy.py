@@ -16,6 +16,7 @@ from models.vocabulary import SILENT
 from server.domain.events import rt_valid
 from server.domain.flow import ABANDONED, exclusion_reason
 from server.domain.money import bonus_minor, reward_minor
+from server.domain.participation import WENT_THROUGH
 from server.domain.study import Pay
 from server.services import codebook
 
@@ -121,7 +122,7 @@ def money_of(pay: Pay | None, status: str, won: int) -> dict[str, Any]:
     return {
         "currency": pay.currency,
         "reward_minor": reward_minor(pay, status),
-        "bonus_minor": bonus_minor(pay, status, won),
+        "bonus_minor": bonus_minor(pay, won) if status in WENT_THROUGH else 0,
     }
 
 

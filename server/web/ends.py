@@ -4,6 +4,7 @@ from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 from server.domain.money import reward_minor, shown
+from server.domain.participation import WENT_THROUGH
 from server.domain.participation import State as Standing
 from server.domain.study import StudyDefinition
 from server.recruitment import mturk, prolific
@@ -51,7 +52,7 @@ def end_page(state: State, submit_hosts: Collection[str] = mturk.SUBMIT_HOSTS) -
     study, told = state.study, told_of(state)
     code = state.code or ""
     link = link_of(state, code, submit_hosts)
-    through = state.state in {Standing.FINISHED, Standing.FAILED}
+    through = state.state in WENT_THROUGH
     return EndPage(
         title=study.title,
         state=state.state.value,
@@ -98,7 +99,7 @@ def told_of(state: State) -> Told:
     heading = HEADINGS[standing]
     contact = CONTACT.format(contact=study.contact)
     pay = WITH_CODE if state.code else BACK
-    if standing in {Standing.FINISHED, Standing.FAILED}:
+    if standing in WENT_THROUGH:
         return Told("good", heading, (study.texts.complete,))
     if standing is Standing.WITHDRAWN:
         return Told("info", heading, (KEPT if state.data_kept else ERASED, pay))
@@ -181,7 +182,7 @@ def paid_of(state: State) -> tuple[tuple[str, str], ...]:
     lines = []
     if reward := reward_minor(pay, state.state):
         lines.append(("For your time", shown(reward, pay.currency)))
-    if state.state in {Standing.FINISHED, Standing.FAILED} and pay.bonus_success_minor:
+    if state.state in WENT_THROUGH and pay.bonus_success_minor:
         won = f"Bonus for {state.progress.won} of {state.progress.rounds} rounds"
         lines.append((won, shown(state.progress.bonus_minor, pay.currency)))
     return tuple(lines)

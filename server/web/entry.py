@@ -78,11 +78,9 @@ def give_consent(
             done = enrol.consent(db, lab, slug, params, agree=agree == "yes", device=device, robot=robot)
     except NotFoundError:
         return html(messages.unknown_study(), 404)
-    if isinstance(done, Enrolled):
-        return into_session(request, lab, slug, params, done.key)
-    if isinstance(done, Refused):
-        return refused(lab, done, params)
-    return consent_again(lab, done, slug, params, TEXT_CHANGED)
+    if isinstance(done, Entry):
+        return consent_again(lab, done, slug, params, TEXT_CHANGED)
+    return decided(request, lab, slug, params, done)
 
 
 @router.post("/s/{slug}/screened")
@@ -96,11 +94,18 @@ def screened(request: Request, lab: CurrentLab, slug: str, fields: Fields, robot
             done = enrol.screen_out(db, lab, slug, params, robot)
     except NotFoundError:
         return html(messages.unknown_study(), 404)
+    if isinstance(done, Entry):
+        return page_of_entry(lab, done, slug, params)
+    return decided(request, lab, slug, params, done)
+
+
+def decided(
+    request: Request, lab: Lab, slug: str, params: Mapping[str, str], done: Enrolled | Refused
+) -> Response:
+    """In, or not."""
     if isinstance(done, Enrolled):
         return into_session(request, lab, slug, params, done.key)
-    if isinstance(done, Refused):
-        return refused(lab, done, params)
-    return page_of_entry(lab, done, slug, params)
+    return refused(lab, done, params)
 
 
 def refused(lab: Lab, done: Refused, params: Mapping[str, str]) -> Response:

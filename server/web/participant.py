@@ -77,7 +77,7 @@ def hand_in(lab: CurrentLab, key: str, fields: Fields) -> Response:
         state = state_of(lab, key)
         if state.form is None:
             return RedirectResponse(f"/p/{key}", 303)
-        page = session_pages.form_page(lab, state, key, given, error.fields)
+        page = session_pages.form_page(state, key, given, error.fields)
         return html(page, 422, frames=frames_of(lab, state))
     return RedirectResponse(f"/p/{key}", 303)
 
@@ -132,7 +132,7 @@ def page_of_state(lab: Lab, state: State, key: str) -> Response:
     if state.kind == "play":
         return html(session_pages.play_page(state, key), frames=frames)
     if state.kind == "form":
-        return html(session_pages.form_page(lab, state, key, {}, {}), frames=frames)
+        return html(session_pages.form_page(state, key, {}, {}), frames=frames)
     hosts = mturk.submit_hosts(lab.settings.mturk_extra_host)
     forms = hosts if state.marketplace == "mturk" else ()
     return html(ends.end_page(state, hosts), frames=frames, forms=forms)

@@ -1,14 +1,11 @@
 """The contexts of the pages that somebody in a study goes through."""
 
 from collections.abc import Mapping
-from typing import Any
 
 from server.domain.forms import Form
-from server.domain.money import shown
+from server.domain.money import bonus_minor, shown
 from server.domain.questionnaire import Item
 from server.domain.study import StudyDefinition
-from server.services import pages, probe
-from server.services.lab import Lab
 from server.services.pages import Page as State
 from server.web.pages import Bar, FormPage, InstructionsPage, PlayPage, Question, WithdrawPage
 
@@ -45,7 +42,7 @@ def bonuses(study: StudyDefinition) -> list[str]:
     pay = study.pay
     if pay is None or not pay.bonus_success_minor:
         return []
-    return [shown(pages.bonus_minor(study, won), pay.currency) for won in range(study.main_rounds + 1)]
+    return [shown(bonus_minor(pay, won), pay.currency) for won in range(study.main_rounds + 1)]
 
 
 def instructions_page(state: State, key: str) -> InstructionsPage:
@@ -104,9 +101,7 @@ def play_page(state: State, key: str) -> PlayPage:
     )
 
 
-def form_page(
-    lab: Lab, state: State, key: str, given: Mapping[str, str], errors: Mapping[str, str]
-) -> FormPage:
+def form_page(state: State, key: str, given: Mapping[str, str], errors: Mapping[str, str]) -> FormPage:
     """The form that is due, with what was answered so far and what was wrong with it."""
     form, study = state.form, state.study
     assert form is not None
@@ -122,19 +117,11 @@ def form_page(
         again=TRY_AGAIN if form.attempt > 1 else "",
         error=LOOK_AGAIN if errors else "",
         answers_url=f"/p/{key}/answers",
-        data=form_data(lab, state, form, key),
+        data={"events_url": f"/p/{key}/events", "page": state.name, **(state.signs or {})},
         bar=bar(state, key),
         language=study.texts.language,
         direction=study.texts.direction,
     )
-
-
-def form_data(lab: Lab, state: State, form: Form, key: str) -> dict[str, Any]:
-    data: dict[str, Any] = {"events_url": f"/p/{key}/events", "page": state.name}
-    if form.kind == "probe":
-        with lab.database.reading() as db:
-            data |= probe.drawing(db, lab, key)
-    return data
 
 
 def question(form: Form, item: Item, given: Mapping[str, str], errors: Mapping[str, str]) -> Question:

@@ -20,10 +20,11 @@ import httpx
 
 from benchmarks.served import DatabaseName, Served, installed
 from server.domain import canonical
+from server.domain.money import bonus_minor
 from server.domain.study import StudyDefinition, answer_key
 from server.services import recruit
 from server.services.lab import Lab
-from server.services.pages import WON, bonus_minor
+from server.services.pages import WON
 from server.services.session import definition_of
 from server.simulate import styles
 from server.simulate.browser import Browser
@@ -36,7 +37,7 @@ from server.simulate.robot import LeftError, Result, Robot
 from server.simulate.timing import Stopwatch
 from server.storage import participants, trials
 from tests.server.web.admin_site import fields_of
-from tests.torture.torture import PAUSE_MAX_S, POLL_S, Report, compare, stored
+from tests.torture.torture import Report, compare, kill_again_and_again, stored
 
 Fate = Literal["finish", "leave", "give back", "withdraw", "confused"]
 DROPOUTS: tuple[Fate, ...] = ("leave", "give back", "withdraw", "confused")
@@ -89,8 +90,6 @@ class Ordeal:
     steps_between: tuple[int, int]
     concurrency: int = 40
     seed: int = 1
-    robots: int = 0
-    """Only for the report's sake."""
 
 
 @dataclass(slots=True)
@@ -255,7 +254,10 @@ async def _suffer(
         async with places:
             await live(person, house, desk, ordeal.seed)
 
-    killer = asyncio.ensure_future(_kill(house, ordeal, people, report))
+    def journals() -> list[Result]:
+        return [person.result for person in people if person.result]
+
+    killer = asyncio.ensure_future(kill_again_and_again(house, ordeal, journals, report))
     experimenter = asyncio.ensure_future(desk.go_on())
     await asyncio.gather(*(one(person) for person in people))
     experimenter.cancel()
@@ -263,22 +265,6 @@ async def _suffer(
     killer.cancel()
     with contextlib.suppress(asyncio.CancelledError):
         await killer  # a server that did not come back is said here
-
-
-async def _kill(house: Served, ordeal: Ordeal, people: Sequence[Person], report: Report) -> None:
-    random = Random(ordeal.seed)
-
-    def acknowledged() -> int:
-        return sum(len(person.result.steps) for person in people if person.result)
-
-    for _ in range(ordeal.kills):
-        due = acknowledged() + random.randint(*ordeal.steps_between)
-        while acknowledged() < due:  # noqa: ASYNC110 - the robots know nothing of the test that they are in
-            await asyncio.sleep(POLL_S)
-        await asyncio.sleep(random.random() * PAUSE_MAX_S)
-        house.kill()
-        report.kills += 1
-        report.restarts_s.append(await asyncio.to_thread(house.start))
 
 
 async def live(person: Person, house: Served, desk: Desk, seed: int) -> None:
@@ -374,7 +360,7 @@ def judge_money(lab: Lab, person: Person, book: dict[str, list[int]], settled: S
         won = trials.won(db, row.study_id, WON).get(row.id, 0)
         study = definition_of(db, lab, row.study_version_id)
     owed: dict[str, tuple[list[int], list[int]]] = {
-        "finished": ([PAY["reward_minor"]], [bonus] if (bonus := bonus_minor(study, won)) else []),  # type: ignore[list-item]
+        "finished": ([PAY["reward_minor"]], [bonus] if (bonus := bonus_minor(study.pay, won)) else []),  # type: ignore[list-item]
         "withdrawn": ([], [PAY["partial_minor"]]),  # type: ignore[list-item]
     }
     rewards, bonuses = owed.get(row.status, ([], []))

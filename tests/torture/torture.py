@@ -7,10 +7,11 @@ must hold the same steps: none missing, none doubled, none that nobody took.
 import asyncio
 import time
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from random import Random
 from statistics import median
+from typing import Protocol
 
 from benchmarks.served import DatabaseName, Served, installed
 from server.domain import canonical
@@ -35,6 +36,17 @@ class Ordeal:
     trials_per_block: int
     steps_between: tuple[int, int]
     seed: int = 1
+
+
+class Dying(Protocol):
+    """What the killer must know of an ordeal."""
+
+    @property
+    def kills(self) -> int: ...
+    @property
+    def steps_between(self) -> tuple[int, int]: ...
+    @property
+    def seed(self) -> int: ...
 
 
 @dataclass(slots=True)
@@ -101,20 +113,21 @@ async def _suffer(house: Served, ordeal: Ordeal, slugs: Sequence[str], report: R
         asyncio.ensure_future(play(crowd, lambda slug=crowd.slug: house.sign(slug), journals=journals))
         for crowd in crowds
     ]
-    killer = asyncio.ensure_future(_kill_again_and_again(house, ordeal, journals, report))
+    killer = asyncio.ensure_future(kill_again_and_again(house, ordeal, lambda: journals, report))
     results = [result for crowd in await asyncio.gather(*playing) for result in crowd]
     killer.cancel()
     await asyncio.gather(killer, return_exceptions=True)
     return results
 
 
-async def _kill_again_and_again(
-    house: Served, ordeal: Ordeal, journals: Sequence[Result], report: Report
+async def kill_again_and_again(
+    house: Served, ordeal: Dying, journals: Callable[[], Sequence[Result]], report: Report
 ) -> None:
+    """Kill the server each time so many more steps were acknowledged, and start it again."""
     random = Random(ordeal.seed)
 
     def acknowledged() -> int:
-        return sum(len(journal.steps) for journal in journals)
+        return sum(len(journal.steps) for journal in journals())
 
     for _ in range(ordeal.kills):
         due = acknowledged() + random.randint(*ordeal.steps_between)
