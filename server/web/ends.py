@@ -45,6 +45,11 @@ DEVICES = {
     "browser": "This browser is too old for the game.",
 }
 """By what the browser found out about itself."""
+SITES = frozenset({"prolific", "mturk"})
+"""Marketplaces that people can give a place back to."""
+CLOSE = "You may close this window."
+NEW_PLACE = "Your site may let you take a new place: then its link brings you back to where you were."
+QUIZ_FAILED = "Not every question about the game was answered right, so that the rounds cannot start."
 CONTACT = "If you think that this is a mistake, write to {contact}."
 
 
@@ -93,25 +98,32 @@ def link_of(state: State, code: str, submit_hosts: Collection[str]) -> ExitLink 
     return exit_link(state.marketplace, code, state.parameters, state.study.completion_url, submit_hosts)
 
 
+def way_back(marketplace: str, has_code: bool) -> str:
+    """What to do next, in words; nobody sent those who came by a direct link."""
+    if has_code:
+        return WITH_CODE
+    return BACK if marketplace in SITES else CLOSE
+
+
 def told_of(state: State) -> Told:
     """The words of an end; whoever failed attention checks is thanked like everybody."""
     study, standing = state.study, state.state
     heading = HEADINGS[standing]
     contact = CONTACT.format(contact=study.contact)
-    pay = WITH_CODE if state.code else BACK
+    pay = way_back(state.marketplace, bool(state.code))
     if standing in WENT_THROUGH:
         return Told("good", heading, (study.texts.complete,))
     if standing is Standing.WITHDRAWN:
         return Told("info", heading, (KEPT if state.data_kept else ERASED, pay))
     if standing is Standing.SCREENED_OUT:
-        return Told("info", heading, screened_out(state.code or "", contact))
+        return Told("info", heading, (QUIZ_FAILED, NO_REJECTION, pay, contact))
     others: dict[Standing, Told] = {
         Standing.TIMED_OUT: Told(
             "wait",
             heading,
             (
                 "You were away for a while, and your place has been given to somebody else.",
-                "Your site may let you take a new place: then its link brings you back to where you were.",
+                NEW_PLACE if state.marketplace in SITES else CLOSE,
                 contact,
             ),
         ),
@@ -147,7 +159,7 @@ def refused_page(
     if code:
         way = (arrival.marketplace, code, arrival.parameters, study.completion_url)
         link = exit_link(*way, submit_hosts)
-    back = WITH_CODE if code else BACK if named else "You may close this window."
+    back = way_back(arrival.marketplace, bool(code) and named)
     why = (study.texts.declined,) if declined else (DEVICES.get(reason, DEVICE), NO_REJECTION)
     return EndPage(
         title=study.title,
@@ -167,11 +179,6 @@ def refused_page(
         language=study.texts.language,
         direction=study.texts.direction,
     )
-
-
-def screened_out(code: str, contact: str) -> tuple[str, ...]:
-    why = "Not every question about the game was answered right, so that the rounds cannot start."
-    return (why, NO_REJECTION, WITH_CODE if code else BACK, contact)
 
 
 def paid_of(state: State) -> tuple[tuple[str, str], ...]:

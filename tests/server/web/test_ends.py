@@ -1,0 +1,49 @@
+"""What an end tells fits the way by which somebody came."""
+
+import pytest
+
+from server.recruitment.arrival import Arrival
+from server.services.lab import Lab
+from server.storage.database import Database
+from server.web.ends import BACK, CLOSE, WITH_CODE, refused_page, way_back
+from tests.fakes import definition, fake_lab
+from tests.server.services.steps import launch
+from tests.server.web.walk import client_of, come_in, prolific
+
+SLUG = "traffic-junction"
+CODES = {"screened_out": "SCREENED", "failed": "", "withdrawn": ""}
+
+
+@pytest.fixture(name="lab")
+def lab_with_a_study(sqlite_database: Database) -> Lab:
+    lab = fake_lab(sqlite_database)
+    launch(lab, definition(SLUG))
+    return lab
+
+
+@pytest.mark.parametrize(
+    ("params", "says", "never"), [(prolific(), BACK, CLOSE), ({}, CLOSE, "return your place")]
+)
+def test_who_withdraws_is_sent_back_only_where_somebody_sent_them(
+    lab: Lab, params: dict[str, str], says: str, never: str
+) -> None:
+    client = client_of(lab)
+    address = come_in(client, SLUG, params)
+    client.post(f"{address}/withdraw", data={"keep": "yes"})
+    page = client.get(address).text
+    assert says in page
+    assert never not in page
+
+
+@pytest.mark.parametrize("marketplace", ["direct", "list"])
+def test_nobody_is_told_of_a_code_that_is_not_shown(marketplace: str) -> None:
+    study = definition(SLUG, codes=CODES)
+    page = refused_page(study, "screened_out", Arrival(marketplace), "phone")  # type: ignore[arg-type]
+    assert page.code == ""
+    assert WITH_CODE not in page.paragraphs
+    assert CLOSE in page.paragraphs
+
+
+def test_a_marketplace_gets_its_code() -> None:
+    page = refused_page(definition(SLUG, codes=CODES), "screened_out", Arrival("prolific", "ada", "s1"))
+    assert (page.code, way_back("prolific", True) in page.paragraphs) == ("SCREENED", True)
