@@ -20,9 +20,10 @@ from server.services.lab import Lab
 from server.services.pages import WON
 from server.services.recruit import Place
 from server.services.recruiters import LISTS_EVERYBODY, recruiter
+from server.services.session import definition_of
 from server.storage import postings, trials
 from server.storage.database import DbSession
-from server.storage.postings import PaymentRow
+from server.storage.postings import OursRow, PaymentRow
 
 SENT, DONE, FAILED = "sent", "done", "failed"
 RETURN_REASON = "Your session at the study did not come to its end there. Please return your place."
@@ -56,7 +57,7 @@ def look(db: DbSession, lab: Lab, posting_id: int) -> Found:
     theirs = [
         Theirs(row.id, row.external_hash, row.state, row.code) for row in postings.submissions(db, posting_id)
     ]
-    ours = people(db, place)
+    ours = people(db, lab, place)
     everybody = place.row.marketplace in LISTS_EVERYBODY
     found = reconciliation.mismatches(ours, theirs, states, pay_at(place), lists_everybody=everybody)
     spent = sum(postings.spent(db, place.row.study_id).values())
@@ -76,9 +77,19 @@ def kind_of(row: PaymentRow) -> reconciliation.ActionKind:
     return next((kind for kind in known if kind == row.kind), "look")
 
 
-def people(db: DbSession, place: Place) -> list[Ours]:
-    """Everybody of the posting's study and mode who came from its marketplace."""
+def people(db: DbSession, lab: Lab, place: Place) -> list[Ours]:
+    """Everybody of the posting's study and mode who came from its marketplace.
+
+    The bonus is that of the version which each of them entered, as their pages say.
+    """
     wins = trials.won(db, place.row.study_id, WON)
+
+    def bonus(row: OursRow) -> int:
+        if row.study_version_id is None:
+            return 0
+        entered = definition_of(db, lab, row.study_version_id)
+        return bonus_minor(entered.pay, wins.get(row.participant_id, 0))
+
     return [
         Ours(
             row.participant_id,
@@ -86,7 +97,7 @@ def people(db: DbSession, place: Place) -> list[Ours]:
             row.submission_id or "",
             row.status,
             row.completion_code or "",
-            bonus_minor(place.study.pay, wins.get(row.participant_id, 0)),
+            bonus(row),
         )
         for row in postings.people(db, place.row.study_id, place.row.marketplace, place.mode)
     ]

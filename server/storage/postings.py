@@ -58,6 +58,8 @@ class OursRow(NamedTuple):
     submission_id: str | None
     status: str
     completion_code: str | None
+    study_version_id: int | None
+    """The version that they entered; None for who never did."""
 
 
 PAYMENT, POSTING = select(payment), select(posting)
@@ -155,6 +157,7 @@ def people(db: DbSession, study_id: int, marketplace: str, mode: str) -> list[Ou
             identity.c.submission_id,
             participant.c.status,
             participant.c.completion_code,
+            participant.c.study_version_id,
         )
         .join(identity, identity.c.participant_id == participant.c.id)
         .where(participant.c.study_id == study_id, participant.c.mode == mode)
@@ -167,7 +170,9 @@ def people(db: DbSession, study_id: int, marketplace: str, mode: str) -> list[Ou
         refusal.c.study_id == study_id, refusal.c.mode == mode
     )
     refusals = [tuple(row) for row in db.read(refused)]
-    return found + [OursRow("", who, None, status, None) for who, status in refusals if who not in known]
+    return found + [
+        OursRow("", who, None, status, None, None) for who, status in refusals if who not in known
+    ]
 
 
 def external_id_of(db: DbSession, participant_id: str) -> str:

@@ -19,7 +19,7 @@ from server.services.verify import verify
 from server.simulate.fake_prolific import FakeProlific, running
 from server.simulate.fake_prolific_market import Market
 from server.simulate.fake_prolific_weather import Weather
-from server.storage import journeys, postings
+from server.storage import journeys, postings, studies
 from server.storage.database import Database
 from tests.fakes import FakeClock, definition, fake_lab
 from tests.server.recruitment.contract import Taken
@@ -261,6 +261,19 @@ def test_a_webhook_is_taken_once_and_an_old_one_does_not_bring_anybody_back(site
 def test_a_webhook_about_nobody_here_is_left_alone(site: Site) -> None:
     said = Submission("elsewhere", "nobody", "active")
     assert not recruit.take_change(site.lab, "prolific", Change("e", "", said))
+
+
+def test_a_later_version_does_not_change_a_bonus_that_was_promised(site: Site) -> None:
+    _, key = site.finish()
+    promised = won(site, key)
+    richer = definition(SLUG, trials_per_block=1, codes=CODES, pay={**PAY, "bonus_success_minor": 5})
+    with site.lab.database.writing() as db:
+        study = studies.by_slug(db, SLUG)
+        assert study is not None
+        studies.add_version(db, study.id, richer.canonical, richer.sha256, site.lab.now_utc())
+    with site.lab.database.reading() as db:
+        (ada,) = reconcile.people(db, site.lab, recruit.place_of(db, site.lab, site.posting_id))
+    assert ada.bonus_minor == promised == 10
 
 
 def test_places_are_added_and_never_taken_away(site: Site) -> None:
