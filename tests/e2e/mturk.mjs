@@ -83,7 +83,7 @@ async function enter(page) {
   await passGate(await typing(page, consent));
   await consent.locator("input[name=read]").check();
   await consent.getByRole("button", { name: "I agree, start" }).click();
-  const probe = await inside(page, "#probe");
+  const probe = await inside(page, "#example-play"); // shown once the page hears keys
   const keys = await typing(page, probe);
   for (const key of ["f", "j"]) await keys.keyboard.press(key);
   await probe.locator("#received .badge").waitFor();

@@ -55,7 +55,7 @@ async function consent(who, page) {
  * @param {string[]} keys
  */
 async function instructions(who, page, what, keys) {
-  await page.locator("#probe").waitFor();
+  await page.locator("#example-play").waitFor(); // shown once the page hears keys
   await page.getByRole("button", { name: "Next" }).click();
   assert.match(String(await page.locator("#why").textContent()), /Press/);
   for (const key of keys) await page.keyboard.press(key);
@@ -111,7 +111,7 @@ async function parentChild(base) {
     await page.goto(`${base}/s/short-parent-child?${invitation()}`);
     await consent(who, page);
     for (let block = 0; block < 2; block += 1) {
-      await page.locator("#probe").waitFor();
+      await page.locator("#example-play").waitFor(); // shown once the page hears keys
       const role = await page.locator("#probe").getAttribute("data-role");
       await instructions(who, page, String(role), role === "parent" ? ["ArrowLeft"] : ["4"]);
       if (role === "parent") await asParent(who, page);
