@@ -26,7 +26,7 @@ Traffic Junction. Success: no car collided in the whole episode. *Human trials* 
 cars; *arrived* is the car in the participant's seat, here driven by the policy.""",
     "predator_prey": """\
 Predator-Prey. *Reward* is summed over an episode, mean over the predators;
-success: all of them reached the prey. Rewards of different grids do not compare.""",
+success: all are on the prey at the end. Rewards of different grids do not compare.""",
 }
 COLUMNS = {
     "parent_child": {

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from models.cli import app
-from models.reproduce import tables
+from models.reproduce import page, tables
 from models.reproduce.cells import Cell
 from models.reproduce.lines import Line, convergence, number
 from models.reproduce.work import Job, do
@@ -136,8 +136,34 @@ def test_a_budget_counts_from_where_it_starts_and_only_if_it_is_kept() -> None:
     line = Line("Enforcer-.3", column, entry, "", [1], 1, [stored])
     assert convergence(line) == [5000]
     assert convergence(line._replace(entry=entry.model_copy(update={"additional": False}))) == [1_005_000]
-    never = stored | {"curve": curve[:20]}
-    assert convergence(line._replace(records=[never])) == [None]
+    early = stored | {"curve": curve[:20]}
+    never = stored | {"curve": curve[:5]}
+    seeds = line._replace(records=[stored, early, never])
+    assert convergence(seeds) == [5000, "too short to tell", "never"]
+
+
+@pytest.mark.parametrize(
+    ("lengths", "shown"),
+    [
+        ([30], "0.02 M"),
+        ([30, 8], "0.02 M, 1 of 2"),
+        ([30, 8, 20], "0.02 M, 1 of 3, 1 of 3 too short to tell"),
+        ([8, 8], "never"),
+        ([20, 19], "too short to tell"),
+        ([8, 20], "never, 1 of 2 too short to tell"),
+    ],
+)
+def test_a_run_that_ended_while_it_was_good_is_not_said_to_have_never_converged(
+    lengths: list[int], shown: str
+) -> None:
+    """The criterion is met from the tenth evaluation on; runs differ in length."""
+    column = tables.load("table1").column[0]
+    entry = tables.Entry(recipe="x", paper={"views.greedy.success": 0.98})
+    curve = ["total,env_steps,success", *(f"{n},{n}000,{0.5 if n < 10 else 0.98}" for n in range(30))]
+    shape = {"content": {"budget": 1.0}, "training": {"env_steps_before": 10_000}}
+    records = [shape | {"curve": curve[: 1 + length]} for length in lengths]
+    line = Line("", column, entry, "", list(range(len(records))), len(records), records)
+    assert page._our_steps(line) == shown
 
 
 def test_several_seeds_give_mean_and_range_and_one_its_interval() -> None:
