@@ -236,8 +236,9 @@ study | string | | Short name of the study, as in its link.
 mode | string | | live, test, preview or robot.
 arm | string | | Arm that is counted; empty: the whole study. Only what follows consent is counted by arm.
 stage | string | | invited, declined, screened_out (device), consented, quiz_failed, withdrawn, timed_out,
-  returned, rejected, abandoned, in_progress, finished, attention_failed, analysed. consented is the sum of
-  the stages from quiz_failed to finished; finished is attention_failed and analysed together.
+  returned, rejected, abandoned, in_progress, erased (nothing else is known of them), finished,
+  attention_failed, analysed. consented is the sum of the stages from quiz_failed to finished; finished is
+  attention_failed and analysed together.
 people | integer | people | How many. Empty: unknown, as it is for invited.
 """)
 

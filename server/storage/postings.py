@@ -126,6 +126,14 @@ def hold(db: DbSession, posting_id: int) -> PostingRow:
     return PostingRow._make(db.read(statement).one())
 
 
+def hold_all(db: DbSession, study_id: int) -> None:
+    """All postings of a study, likewise, always in the same order; before any participant is held."""
+    db.hold()
+    db.read(
+        select(posting.c.id).where(posting.c.study_id == study_id).order_by(posting.c.id).with_for_update()
+    )
+
+
 def told(db: DbSession, posting_id: int, state: str, places: int) -> None:
     db.write(update(posting).where(posting.c.id == posting_id).values(state=state, places=places))
 

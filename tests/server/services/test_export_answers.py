@@ -273,6 +273,7 @@ def test_the_flow_adds_up_from_consent_to_analysis_and_is_the_same_in_the_manife
         "rejected": "1",
         "abandoned": "0",
         "in_progress": "1",
+        "erased": "0",
         "finished": "2",
         "attention_failed": "1",
         "analysed": "1",
