@@ -5,6 +5,7 @@ from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
 from server.domain.errors import NotReadyError
+from server.domain.reconciliation import Site
 from server.domain.study import StudyDefinition
 from server.services.lab import Lab
 from server.settings import Settings
@@ -16,8 +17,7 @@ if TYPE_CHECKING:
     from server.recruitment.recruiter import Recruiter
 
 NAMES = {"prolific": "Prolific", "mturk": "Mechanical Turk"}
-LISTS_EVERYBODY = frozenset({"prolific"})
-"""Marketplaces that tell of people who took a place and have not handed in yet."""
+SITES = {"prolific": Site(), "mturk": Site(lists_everybody=False, pays_in_parts=False)}
 
 
 def is_connected(settings: Settings, marketplace: str) -> bool:
