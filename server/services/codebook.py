@@ -203,7 +203,7 @@ token | integer | | Token (index in the bundle) behind the sign; from 0.
 row | integer | cells | Marked cell: row from the top; from 0.
 column | integer | cells | Marked cell: column from the left; from 0.
 probability | number | probability | P(cell given token) of the marked cell, by the lexicon of the arm's
-  agent. This and the three that follow are empty if that agent was not loaded at the export.
+  agent. This and the three that follow are empty if that very agent was not loaded at the export.
 best | number | probability | The largest P(cell given token): what the best mark would have got.
 distance | number | steps | Expected steps (up, down, left, right) from the marked cell to where the token is
   said.

@@ -3,6 +3,7 @@
 import csv
 import json
 from collections import Counter
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from server.services.lab import Lab
 from server.services.session import session_of
 from server.storage import participants
 from server.storage.database import Database
-from tests.fakes import FakeClock, definition, fake_lab
+from tests.fakes import FakeClock, definition, fake_bundle, fake_lab
 from tests.server.services.steps import DESKTOP, come_in, launch, prolific
 from tests.server.services.walks import (
     TIMED,
@@ -152,6 +153,14 @@ def test_without_the_agent_marks_are_exported_unscored_and_the_manifest_names_it
     assert {row["probability"] for row in rows} == {""}
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
     assert manifest["agents_not_loaded"] == ["parent_child/onehot-9", "parent_child/prototype-9"]
+
+
+def test_marks_are_not_scored_against_another_agent_of_the_same_name(lab: Lab, tmp_path: Path) -> None:
+    walk_to(lab, entered(lab, SLUG), at_end)
+    others = {name: fake_bundle(name, seed=2) for name in lab.bundles}
+    rows = exported(replace(lab, bundles=others), tmp_path / "out")["probe"]
+    assert len(rows) == 9
+    assert {row["probability"] for row in rows} == {""}
 
 
 def test_window_events_and_the_journey_come_in_order(lab: Lab, tmp_path: Path) -> None:
