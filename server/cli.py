@@ -6,6 +6,7 @@ imported by the command that needs it; `hatlab serve` never loads training.
 
 import gc
 import sys
+import time
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -283,6 +284,32 @@ def invite(
     else:
         out.write_bytes(sheets.plain(("name", "link"), rows))
         typer.echo(f"{len(rows)} links: {out}")
+
+
+@app.command()
+def poll(
+    study: Annotated[
+        str | None, typer.Argument(metavar="[STUDY]", help="Only this study's postings, also in test mode.")
+    ] = None,
+    every: Annotated[
+        float | None, typer.Option(min=5, metavar="SECONDS", help="Ask again and again, until interrupted.")
+    ] = None,
+) -> None:
+    """Ask the marketplaces how each posting stands, and take it in. Exit 1 if one could not be asked."""
+    from server.services.lab import Lab
+    from server.services.poll import poll as ask
+
+    lab = Lab.without_agents(settings_of_environment())
+    while True:
+        done = []
+        for asked in ask(lab, study):
+            typer.echo(asked.text)
+            done.append(asked.submissions is not None)
+        if not done:
+            typer.echo("no posting to ask about")
+        if every is None:
+            raise typer.Exit(0 if all(done) else 1)
+        time.sleep(every)
 
 
 def lines_of(path: Path) -> list[str]:

@@ -9,6 +9,8 @@ from enum import StrEnum
 
 ABANDONED = "abandoned"
 """Standing of who came to no end and was not seen for longer than the lease."""
+ERASED = "erased"
+"""Standing of who had consented and was erased for good: only that they were there is known."""
 
 
 class Stage(StrEnum):
@@ -24,6 +26,7 @@ class Stage(StrEnum):
     REJECTED = "rejected"
     ABANDONED = "abandoned"
     IN_PROGRESS = "in_progress"
+    ERASED = "erased"
     FINISHED = "finished"
     """Went through everything, attentive or not."""
     ATTENTION_FAILED = "attention_failed"
@@ -38,6 +41,7 @@ STANDINGS: Mapping[str, Stage] = {
     "rejected": Stage.REJECTED,
     ABANDONED: Stage.ABANDONED,
     "active": Stage.IN_PROGRESS,
+    ERASED: Stage.ERASED,
     "failed": Stage.ATTENTION_FAILED,
     "finished": Stage.ANALYSED,
 }
@@ -51,6 +55,7 @@ REASONS: Mapping[Stage, str] = {
     Stage.REJECTED: "rejected",
     Stage.ABANDONED: "incomplete",
     Stage.IN_PROGRESS: "incomplete",
+    Stage.ERASED: "erased",
     Stage.ATTENTION_FAILED: "attention",
 }
 """Why somebody who stands there is not analysed."""

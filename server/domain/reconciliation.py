@@ -6,7 +6,7 @@ proposed to be rejected.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from server.domain.participation import ACTIVE, WENT_THROUGH
@@ -33,6 +33,20 @@ class Ours:
     """`active`, one of the ends, `declined`."""
     code: str
     bonus_minor: int
+    partial_minor: int = 0
+    """What who withdrew was promised; of the version that they entered, like the bonus."""
+    must_be_listed: bool = True
+    """False for who came in by another posting, or in another mode: this list need not hold them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What a marketplace can do."""
+
+    lists_everybody: bool = True
+    """It also tells of people who have not handed in."""
+    pays_in_parts: bool = True
+    """What was handed in can be screened out or given back; else it is paid whole, or rejected."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,8 +82,7 @@ def mismatches(
     theirs: Sequence[Theirs],
     ledger: Mapping[str, str],
     pay: Pay | None,
-    *,
-    lists_everybody: bool = True,
+    site: Site = Site(),
 ) -> list[Mismatch]:
     """All differences, in the order of submissions.
 
@@ -78,7 +91,7 @@ def mismatches(
         theirs: every submission of it.
         ledger: state of every payment or request so far (`sent`, `done`, `failed`) by mismatch key.
         pay: what the study pays; None: nothing is proposed that costs.
-        lists_everybody: whether the marketplace also tells of people who have not handed in.
+        site: what the marketplace can do.
     """
     by_submission = {person.submission_id: person for person in ours if person.submission_id}
     by_hash = {person.external_hash: person for person in ours}
@@ -91,14 +104,24 @@ def mismatches(
             elif their.state not in OVER:
                 found.append(second_submission(other, their))
                 continue
-        found += between(person, their, pay)
+        found += between(person, their, pay, site)
     known = {their.submission_id for their in theirs}
-    missing = [p for p in ours if p.submission_id and p.submission_id not in known]
-    found += [unknown_there(person) for person in missing if lists_everybody]
+    missing = [p for p in ours if p.must_be_listed and p.submission_id and p.submission_id not in known]
+    found += [unknown_there(person) for person in missing if site.lists_everybody]
+    if not site.pays_in_parts:
+        found = [without_return(each) for each in found]
     return [each for each in found if ledger.get(each.key) != "done"]
 
 
-def between(person: Ours | None, their: Theirs, pay: Pay | None) -> Iterator[Mismatch]:
+def without_return(found: Mismatch) -> Mismatch:
+    """The same where what was handed in cannot be given back: nobody is asked for what they cannot do."""
+    if found.action != "ask_return":
+        return found
+    says = f"{found.says}; what is handed in there cannot be given back, and is paid by itself in the end"
+    return replace(found, key=key_of("look", found.submission_id), action="look", says=says)
+
+
+def between(person: Ours | None, their: Theirs, pay: Pay | None, site: Site) -> Iterator[Mismatch]:
     """What is open between one person and one submission."""
     if person is None:
         yield from nobody_here(their)
@@ -108,8 +131,10 @@ def between(person: Ours | None, their: Theirs, pay: Pay | None) -> Iterator[Mis
         yield from through(person, their, pay)
     elif person.status == "screened_out":
         yield from screened_out(person, their, pay)
-    elif person.status in {"withdrawn", "declined", "timed_out", "returned", "rejected"}:
-        yield from gone(person, their, pay)
+    elif person.status == "withdrawn":
+        yield from withdrew(person, their, pay, site)
+    elif person.status in {"declined", "timed_out", "returned", "rejected"}:
+        yield from gone(person, their)
 
 
 def nobody_here(their: Theirs) -> Iterator[Mismatch]:
@@ -153,12 +178,23 @@ def screened_out(person: Ours, their: Theirs, pay: Pay | None) -> Iterator[Misma
         yield mismatch(person, their, "look", "screened out here, paid in full there")
 
 
-def gone(person: Ours, their: Theirs, pay: Pay | None) -> Iterator[Mismatch]:
-    if person.status == "withdrawn" and pay and pay.partial_minor and their.state != "rejected":
-        yield mismatch(person, their, "partial", "withdrew here: partial pay is owed", pay.partial_minor)
+def withdrew(person: Ours, their: Theirs, pay: Pay | None, site: Site) -> Iterator[Mismatch]:
+    """Part of the reward; where only the whole can be paid, the whole, and nothing beside it."""
+    if not site.pays_in_parts:
+        if their.state == "awaiting_review":
+            says = "withdrew here and handed in there, where only the whole reward can be paid"
+            yield mismatch(person, their, "approve", says, pay.reward_minor if pay else 0)
+        return
+    if person.partial_minor and their.state != "rejected":
+        yield mismatch(person, their, "partial", "withdrew here: partial pay is owed", person.partial_minor)
+    if their.state in {"awaiting_review", "active"}:
+        yield mismatch(person, their, "ask_return", "withdrawn here, still open there")
+
+
+def gone(person: Ours, their: Theirs) -> Iterator[Mismatch]:
     if their.state in {"awaiting_review", "active"}:
         yield mismatch(person, their, "ask_return", f"{words(person.status)} here, still open there")
-    elif their.state in PAID and person.status != "withdrawn":
+    elif their.state in PAID:
         yield mismatch(person, their, "look", f"{words(person.status)} here, paid there")
 
 

@@ -203,7 +203,7 @@ token | integer | | Token (index in the bundle) behind the sign; from 0.
 row | integer | cells | Marked cell: row from the top; from 0.
 column | integer | cells | Marked cell: column from the left; from 0.
 probability | number | probability | P(cell given token) of the marked cell, by the lexicon of the arm's
-  agent. This and the three that follow are empty if that agent was not loaded at the export.
+  agent. This and the three that follow are empty if that very agent was not loaded at the export.
 best | number | probability | The largest P(cell given token): what the best mark would have got.
 distance | number | steps | Expected steps (up, down, left, right) from the marked cell to where the token is
   said.
@@ -236,8 +236,9 @@ study | string | | Short name of the study, as in its link.
 mode | string | | live, test, preview or robot.
 arm | string | | Arm that is counted; empty: the whole study. Only what follows consent is counted by arm.
 stage | string | | invited, declined, screened_out (device), consented, quiz_failed, withdrawn, timed_out,
-  returned, rejected, abandoned, in_progress, finished, attention_failed, analysed. consented is the sum of
-  the stages from quiz_failed to finished; finished is attention_failed and analysed together.
+  returned, rejected, abandoned, in_progress, erased (nothing else is known of them), finished,
+  attention_failed, analysed. consented is the sum of the stages from quiz_failed to finished; finished is
+  attention_failed and analysed together.
 people | integer | people | How many. Empty: unknown, as it is for invited.
 """)
 

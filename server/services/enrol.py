@@ -277,9 +277,14 @@ def check_robot(lab: Lab, slug: str, signature: str) -> None:
         raise BadInputError("X-Hatlab-Robot: signed for another study")
 
 
+def recognised(lab: Lab, slug: str, params: Mapping[str, str]) -> Arrival:
+    """Who arrives by this link, a person of the lab's own list by name; a direct one has none."""
+    return recognition.recognise(params, partial(personal.name_of, slug=slug, key=lab.secret_key))
+
+
 def arrival_of(lab: Lab, slug: str, params: Mapping[str, str]) -> Arrival:
     """The marketplace's arrival; a direct one is named after its visit, which no marketplace names."""
-    arrival = recognition.recognise(params, partial(personal.name_of, slug=slug, key=lab.secret_key))
+    arrival = recognised(lab, slug, params)
     if arrival.external_id is not None or arrival.preview or arrival.forged:
         return arrival
     visit = params.get(VISIT, "")

@@ -8,10 +8,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from server.domain.errors import BadInputError, NotFoundError
+from server.domain.flow import ERASED
 from server.domain.money import reward_minor
 from server.services.lab import Lab
 from server.services.session import definition_of
-from server.storage import enrolments, erasure, participants, refusals, studies
+from server.storage import enrolments, erasure, participants, postings, refusals, studies
 from server.storage.database import DbSession
 from server.storage.participants import ParticipantRow
 from server.storage.studies import StudyRow
@@ -112,14 +113,21 @@ def is_due(db: DbSession, lab: Lab, row: ParticipantRow | None) -> bool:
 def erase(db: DbSession, who: Known) -> None:
     """Delete everything of `who`. The amounts that were paid stay, and name nobody.
 
+    That somebody was there is counted on: in the flow of the study, by mode and arm.
+
     Raises:
         BadInputError: a payment is on its way; how it ends must be known first.
     """
-    db.hold()
-    if who.participant_id is not None:
-        if erasure.SENT in erasure.payments(db, who.participant_id):
+    studies.hold(db, who.study_id)  # locks in the order of all others: study, postings, participant
+    postings.hold_all(db, who.study_id)  # no payment begins, and nothing more is told of them, meanwhile
+    row = participants.find(db, who.participant_id) if who.participant_id else None
+    if row is not None:
+        if erasure.SENT in erasure.payments(db, row.id):
             raise BadInputError("a payment of this person is on its way: look at it in Recruitment first")
-        participants.hold(db, who.participant_id)
-        erasure.delete_person(db, who.participant_id)
+        participants.hold(db, row.id)
+        erasure.delete_person(db, row.id)
+        erasure.count_one(db, row.study_id, row.mode, row.arm, ERASED)
     erasure.delete_submissions(db, who.study_id, who.external_hash)
-    refusals.delete_of(db, who.study_id, who.external_hash)
+    if (refused := refusals.of(db, who.study_id, who.external_hash)) is not None:
+        refusals.delete_of(db, who.study_id, who.external_hash)
+        erasure.count_one(db, who.study_id, refused.mode, "", refused.status)

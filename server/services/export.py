@@ -85,9 +85,16 @@ class _Page:
         return self._definitions[person["study_version"]]
 
     def lexicon(self, person: tidy.Row) -> "Lexicon | None":
-        """What the agent's tokens mean with whom this person played; None: it is not loaded."""
+        """What the agent's tokens mean with whom this person played; None: that very agent is not loaded."""
         bundle = self._bundles.get(self.definition(person).arm(person["arm"]).bundle)
-        return bundle.lexicon if bundle else None
+        if bundle is None or self.played.get(person["id"]) != {bundle.sha256}:
+            return None
+        return bundle.lexicon
+
+    @cached_property
+    def played(self) -> Mapping[str, set[str]]:
+        """By person, the agents that they met, by hash."""
+        return exports.bundles_played(self._db, self.known)
 
     @cached_property
     def stories(self) -> tuple[tidy.Story, ...]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from server.domain import canonical, flow
-from server.domain.flow import ABANDONED, Stage
+from server.domain.flow import ABANDONED, ERASED, Stage
 from server.domain.study import from_json
-from server.storage import headcounts, refusals, studies
+from server.storage import erasure, headcounts, refusals, studies
 from server.storage.database import DbSession
 from server.storage.headcounts import Stand
 
@@ -32,8 +32,12 @@ def flows(db: DbSession, study_id: int, now: datetime, modes: Sequence[str]) -> 
     stands = [stand for row in versions for stand in stands_of(db, row.id, row.definition, now)]
     found = []
     for mode in modes:
+        gone = erasure.counted(db, study_id, mode)
         mine = [stand for stand in stands if stand.mode == mode]
-        whole = flow.counted(by_standing(mine), refusals.counts(db, study_id, mode))
+        mine += [Stand(mode, *each) for each in gone if each.standing == ERASED]
+        refused = Counter(refusals.counts(db, study_id, mode))
+        refused.update({each.standing: each.people for each in gone if each.standing != ERASED})
+        whole = flow.counted(by_standing(mine), refused)
         of_arms = {
             arm: flow.after_consent(by_standing([stand for stand in mine if stand.arm == arm]))
             for arm in arms

@@ -129,6 +129,8 @@ def advance(db: DbSession, lab: Lab, participant: ParticipantRow, from_page: str
         return
     if kind not in {"instructions", *ROUNDS} or not page_is_through(db, session):
         return
+    if due_form(db, session) is not None:
+        return  # whoever went past a check could never hand it in, and would never get a code
     turn(db, lab, session)
 
 

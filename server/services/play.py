@@ -11,6 +11,7 @@ from typing import Any
 
 from server.domain import canonical, events, trial
 from server.domain.errors import BadInputError, ClosedError, NotFoundError, StaleError
+from server.domain.participation import ACTIVE
 from server.domain.plan import Round
 from server.domain.view import Heard, Place, View, roads, saw, view_for
 from server.services import fold, lease, pages
@@ -61,6 +62,8 @@ def open_round(db: DbSession, lab: Lab, participant: ParticipantRow, after: int 
         pages.turn(db, lab, session)
         return PageChange()
     row = newest if newest and in_hand else begin_round(db, lab, session, wanted)
+    if row is None:
+        return PageChange()
     kept = current(db, lab, row)
     keep_seen(db, lab, participant)
     return {**shown(kept, row.last_seq), "roads": roads(kept.running.trial)}
@@ -75,8 +78,11 @@ def wanted_round(rounds: Sequence[Round], newest: TrialRow | None, after: int | 
     return next((planned for planned in rounds if planned.round == due), None)
 
 
-def begin_round(db: DbSession, lab: Lab, session: Session, planned: Round) -> TrialRow:
-    """Store event 0 of a new trial, or find that another tab has just done so."""
+def begin_round(db: DbSession, lab: Lab, session: Session, planned: Round) -> TrialRow | None:
+    """Store event 0 of a new trial, or find that another tab has just done so.
+
+    None: meanwhile the participant came to an end or turned the page, and nothing of them may be stored here.
+    """
     participant = session.participant
     spec = spec_of(lab, session, planned)
     running, said = fold.begin(lab, spec)
@@ -106,7 +112,9 @@ def begin_round(db: DbSession, lab: Lab, session: Session, planned: Round) -> Tr
         started_utc=now_utc,
         ended_utc=None,
     )
-    participants.hold(db, participant.id)
+    held = participants.hold(db, participant.id)
+    if (held.page, held.status) != (participant.page, ACTIVE):
+        return None
     if there := trials.of_round(db, participant.id, planned.round):
         return there
     trials.add(db, row)

@@ -6,7 +6,7 @@ and the purpose, so that it happens once, whoever presses how often and whicheve
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import get_args
 
 from server.domain import canonical, reconciliation
@@ -19,7 +19,7 @@ from server.services import recruit
 from server.services.lab import Lab
 from server.services.pages import WON
 from server.services.recruit import Place
-from server.services.recruiters import LISTS_EVERYBODY, recruiter
+from server.services.recruiters import SITES, recruiter
 from server.services.session import definition_of
 from server.storage import postings, trials
 from server.storage.database import DbSession
@@ -58,16 +58,15 @@ def look(db: DbSession, lab: Lab, posting_id: int) -> Found:
         Theirs(row.id, row.external_hash, row.state, row.code) for row in postings.submissions(db, posting_id)
     ]
     ours = people(db, lab, place)
-    everybody = place.row.marketplace in LISTS_EVERYBODY
-    found = reconciliation.mismatches(ours, theirs, states, pay_at(place), lists_everybody=everybody)
+    found = reconciliation.mismatches(ours, theirs, states, pay_at(place), SITES[place.row.marketplace])
     spent = sum(postings.spent(db, place.row.study_id).values())
     return Found(place, tuple(found), tuple(ledger), spent)
 
 
 def pay_at(place: Place) -> Pay | None:
-    """The study's pay as the marketplace pays it: MTurk has no screen-out, who handed in gets the reward."""
+    """The study's pay as the marketplace pays it: where it has no parts, a screen-out costs the reward."""
     pay = place.study.pay
-    if pay is None or place.row.marketplace != "mturk":
+    if pay is None or SITES[place.row.marketplace].pays_in_parts:
         return pay
     return pay.model_copy(update={"screen_out_minor": pay.reward_minor})
 
@@ -78,29 +77,27 @@ def kind_of(row: PaymentRow) -> reconciliation.ActionKind:
 
 
 def people(db: DbSession, lab: Lab, place: Place) -> list[Ours]:
-    """Everybody of the posting's study and mode who came from its marketplace.
+    """Everybody of the posting's study who came from its marketplace, in whichever mode the study was then.
 
-    The bonus is that of the version which each of them entered, as their pages say.
+    Bonus and partial pay are those of the version which each of them entered, as their pages say.
     """
     wins = trials.won(db, place.row.study_id, WON)
+    elsewhere = postings.told_elsewhere(db, place.row)
 
-    def bonus(row: OursRow) -> int:
-        if row.study_version_id is None:
-            return 0
-        entered = definition_of(db, lab, row.study_version_id)
-        return bonus_minor(entered.pay, wins.get(row.participant_id, 0))
-
-    return [
-        Ours(
+    def ours(row: OursRow) -> Ours:
+        pay = definition_of(db, lab, row.study_version_id).pay if row.study_version_id else None
+        return Ours(
             row.participant_id,
             row.external_hash,
             row.submission_id or "",
             row.status,
             row.completion_code or "",
-            bonus(row),
+            bonus_minor(pay, wins.get(row.participant_id, 0)),
+            pay.partial_minor if pay else 0,
+            must_be_listed=row.mode == place.mode and row.submission_id not in elsewhere,
         )
-        for row in postings.people(db, place.row.study_id, place.row.marketplace, place.mode)
-    ]
+
+    return [ours(row) for row in postings.people(db, place.row.study_id, place.row.marketplace)]
 
 
 def confirm(lab: Lab, posting_id: int, keys: Sequence[str], asked_by: str) -> list[Outcome]:
@@ -140,7 +137,8 @@ Begun = tuple[Place, Mismatch, str, PaymentRow | None]
 
 def begin(db: DbSession, lab: Lab, posting_id: int, key: str, asked_by: str) -> Begun | Outcome:
     """Write down that something is on its way, if it is still to be done and within the caps."""
-    postings.hold(db, posting_id)
+    place = recruit.place_of(db, lab, posting_id)
+    postings.hold_all(db, place.row.study_id)  # the caps are the study's, whichever posting is paid
     found = look(db, lab, posting_id)
     mismatch = next((each for each in found.mismatches if each.key == key), None)
     if mismatch is None:
@@ -158,6 +156,8 @@ def begin(db: DbSession, lab: Lab, posting_id: int, key: str, asked_by: str) -> 
         reconciliation.check_caps(found.place.study.pay, mismatch.amount_minor, so_far, sum(spent.values()))
         postings.begin_payment(db, payment_row(lab, found.place, mismatch, asked_by))
         before = None
+    else:
+        mismatch = replace(mismatch, amount_minor=before.amount_minor)  # the very payment that was begun
     external_id = ""
     if mismatch.participant_id:
         external_id = postings.external_id_of(db, mismatch.participant_id)

@@ -45,6 +45,7 @@ class Place(NamedTuple):
     row: PostingRow
     study: StudyDefinition
     mode: str
+    """Of the study now: who enters next counts so."""
     slug: str
 
 
@@ -107,7 +108,7 @@ def place_of(db: DbSession, lab: Lab, posting_id: int) -> Place:
     version = studies.newest_version(db, owner.id)
     assert version is not None
     study = definition_of(db, lab, version.id)
-    return Place(row, study, canonical.loads(row.content)["mode"], owner.slug)
+    return Place(row, study, owner.mode, owner.slug)
 
 
 def publish(lab: Lab, posting_id: int) -> None:

@@ -5,7 +5,9 @@ from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
 from server.domain.errors import NotReadyError
+from server.domain.reconciliation import Site
 from server.domain.study import StudyDefinition
+from server.recruitment.recruiter import RecruiterError
 from server.services.lab import Lab
 from server.settings import Settings
 from server.storage import postings
@@ -16,8 +18,7 @@ if TYPE_CHECKING:
     from server.recruitment.recruiter import Recruiter
 
 NAMES = {"prolific": "Prolific", "mturk": "Mechanical Turk"}
-LISTS_EVERYBODY = frozenset({"prolific"})
-"""Marketplaces that tell of people who took a place and have not handed in yet."""
+SITES = {"prolific": Site(), "mturk": Site(lists_everybody=False, pays_in_parts=False)}
 
 
 def is_connected(settings: Settings, marketplace: str) -> bool:
@@ -33,11 +34,14 @@ def recruiter(lab: Lab, marketplace: str, study: StudyDefinition) -> Iterator["R
     """A connection for one piece of work.
 
     Raises:
-        NotReadyError: no account is set up.
+        NotReadyError: no account is set up, or the settings of it cannot be used.
     """
     if not is_connected(lab.settings, marketplace):
         raise NotReadyError(f"no account at {NAMES.get(marketplace, marketplace)}: see docs/settings.md")
-    opened = mturk(lab) if marketplace == "mturk" else prolific(lab.settings, study)
+    try:
+        opened = mturk(lab) if marketplace == "mturk" else prolific(lab.settings, study)
+    except RecruiterError as error:
+        raise NotReadyError(str(error)) from error
     with closing(opened):
         yield opened
 

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from server.domain.participation import ACTIVE
 from server.services.lab import Lab
-from server.storage import browser_log
+from server.storage import browser_log, participants
 from server.storage.browser_log import BrowserEventRow
 from server.storage.database import DbSession
 from server.storage.participants import ParticipantRow
@@ -25,7 +25,7 @@ def keep(
     happened: Sequence[Happened],
 ) -> int:
     """Store the events that are new; how many those were. After the end nothing is kept."""
-    if participant.status != ACTIVE:
+    if participant.status != ACTIVE or participants.hold(db, participant.id).status != ACTIVE:
         return 0
     now_utc = lab.now_utc()
     rows = [

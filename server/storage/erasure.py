@@ -1,13 +1,15 @@
-"""Deleting what is known of a person: their data, or all of them."""
+"""Deleting what is known of a person: their data, or all of them. How many were erased is counted."""
 
 import secrets
+from typing import NamedTuple
 
-from sqlalchemy import ColumnElement, delete, func, select, update
+from sqlalchemy import ColumnElement, delete, func, select, text, update
 
 from server.storage.database import DbSession
 from server.storage.tables import (
     answer,
     browser_event,
+    erased,
     identity,
     journey,
     participant,
@@ -21,6 +23,20 @@ DATA = (trial, answer, browser_event)
 """What somebody did; events go with their trials."""
 SENT = "sent"
 """State of a payment that is on its way."""
+# the same words in SQLite and in PostgreSQL; SQLAlchemy has one insert for each
+ONE_MORE = text(
+    "INSERT INTO erased (study_id, mode, arm, standing, people) "
+    "VALUES (:study_id, :mode, :arm, :standing, 1) "
+    "ON CONFLICT (study_id, mode, arm, standing) DO UPDATE SET people = erased.people + 1"
+)
+
+
+class Erased(NamedTuple):
+    """People who agree in arm (empty: none was drawn) and standing, and of whom nothing else is known."""
+
+    arm: str
+    standing: str
+    people: int
 
 
 def delete_data(db: DbSession, participant_id: str) -> None:
@@ -76,3 +92,16 @@ def submissions(db: DbSession, study_id: int, external_hash: str) -> int:
 def payments(db: DbSession, participant_id: str) -> list[str]:
     """State of each payment to a person."""
     return list(db.read(select(payment.c.state).where(of_person(participant_id))).scalars())
+
+
+def count_one(db: DbSession, study_id: int, mode: str, arm: str, standing: str) -> None:
+    """Count somebody who was erased."""
+    db.write(ONE_MORE, {"study_id": study_id, "mode": mode, "arm": arm, "standing": standing})
+
+
+def counted(db: DbSession, study_id: int, mode: str) -> list[Erased]:
+    """How many were erased."""
+    statement = select(erased.c.arm, erased.c.standing, erased.c.people).where(
+        erased.c.study_id == study_id, erased.c.mode == mode
+    )
+    return [Erased._make(row) for row in db.read(statement.order_by(erased.c.arm, erased.c.standing))]

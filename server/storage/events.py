@@ -6,7 +6,9 @@ The primary key (trial_id, seq) is the lock of a step.
 from typing import NamedTuple
 
 from sqlalchemy import bindparam, select, text
+from sqlalchemy.exc import IntegrityError
 
+from server.domain.errors import ClosedError
 from server.storage.database import DbSession
 from server.storage.tables import event
 
@@ -33,8 +35,15 @@ SEQ_MAX = 2**31 - 1
 
 
 def append(db: DbSession, row: EventRow) -> bool:
-    """Store the event; False if another writer has stored this step of the trial before."""
-    return db.write(APPEND, row._asdict()).rowcount == 1
+    """Store the event; False if another writer has stored this step of the trial before.
+
+    Raises:
+        ClosedError: the trial was deleted meanwhile: its person left without leaving data.
+    """
+    try:
+        return db.write(APPEND, row._asdict()).rowcount == 1
+    except IntegrityError as error:
+        raise ClosedError("this session is over; load its page again to see what to do") from error
 
 
 def of_trial(db: DbSession, trial_id: str, seq_max: int = SEQ_MAX) -> list[EventRow]:

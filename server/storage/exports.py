@@ -103,6 +103,19 @@ def won(db: DbSession, participants: Sequence[str], outcomes: Collection[str]) -
     return dict(cast("list[tuple[str, int]]", [tuple(row) for row in db.read(statement)]))
 
 
+def bundles_played(db: DbSession, participants: Sequence[str]) -> dict[str, set[str]]:
+    """The sha256 of every agent that each of these people played with."""
+    statement = (
+        select(trial.c.participant_id, trial.c.bundle_sha256)
+        .where(trial.c.participant_id.in_(participants), trial.c.bundle_sha256.is_not(None))
+        .distinct()
+    )
+    found: dict[str, set[str]] = {}
+    for who, sha256 in db.read(statement):
+        found.setdefault(who, set()).add(sha256)
+    return found
+
+
 def attention_failed(db: DbSession, participants: Sequence[str]) -> dict[str, int]:
     """How many attention checks each of these people has failed; who failed none is not there."""
     statement = (

@@ -5,6 +5,7 @@ from typing import NamedTuple
 
 from sqlalchemy import bindparam, func, insert, or_, select, update
 
+from server.domain.errors import NotFoundError
 from server.storage.database import DbSession
 from server.storage.tables import participant
 
@@ -68,10 +69,17 @@ def find(db: DbSession, participant_id: str) -> ParticipantRow | None:
 
 
 def hold(db: DbSession, participant_id: str) -> ParticipantRow:
-    """The participant, locked until the transaction ends."""
+    """The participant, locked until the transaction ends.
+
+    Raises:
+        NotFoundError: the person was erased meanwhile.
+    """
     db.hold()
     statement = PARTICIPANT.where(participant.c.id == participant_id).with_for_update()
-    return ParticipantRow._make(db.read(statement).one())
+    row = db.read(statement).one_or_none()
+    if row is None:
+        raise NotFoundError("there is no such session any more")
+    return ParticipantRow._make(row)
 
 
 def seen(db: DbSession, participant_id: str, now_utc: str) -> None:

@@ -60,9 +60,11 @@ class OursRow(NamedTuple):
     completion_code: str | None
     study_version_id: int | None
     """The version that they entered; None for who never did."""
+    mode: str
 
 
 PAYMENT, POSTING = select(payment), select(posting)
+ROBOT = "robot"
 
 
 def add(
@@ -126,6 +128,14 @@ def hold(db: DbSession, posting_id: int) -> PostingRow:
     return PostingRow._make(db.read(statement).one())
 
 
+def hold_all(db: DbSession, study_id: int) -> None:
+    """All postings of a study, likewise, always in the same order; before any participant is held."""
+    db.hold()
+    db.read(
+        select(posting.c.id).where(posting.c.study_id == study_id).order_by(posting.c.id).with_for_update()
+    )
+
+
 def told(db: DbSession, posting_id: int, state: str, places: int) -> None:
     db.write(update(posting).where(posting.c.id == posting_id).values(state=state, places=places))
 
@@ -148,8 +158,21 @@ def submissions(db: DbSession, posting_id: int) -> list[SubmissionRow]:
     return [SubmissionRow._make(row) for row in db.read(statement)]
 
 
-def people(db: DbSession, study_id: int, marketplace: str, mode: str) -> list[OursRow]:
-    """Everybody of the study who came from this marketplace, and who declined or was screened out there."""
+def told_elsewhere(db: DbSession, row: PostingRow) -> set[str]:
+    """Submissions to the same study that its other postings at this marketplace were told of."""
+    others = select(posting.c.id).where(
+        posting.c.study_id == row.study_id,
+        posting.c.marketplace == row.marketplace,
+        posting.c.id != row.id,
+    )
+    return set(db.read(select(submission.c.id).where(submission.c.posting_id.in_(others))).scalars())
+
+
+def people(db: DbSession, study_id: int, marketplace: str) -> list[OursRow]:
+    """Everybody of the study who came from this marketplace, and who declined or was screened out there.
+
+    A study may have gone from test to live mode after it was posted: a submission is a person's in both.
+    """
     entered = (
         select(
             participant.c.id,
@@ -158,20 +181,21 @@ def people(db: DbSession, study_id: int, marketplace: str, mode: str) -> list[Ou
             participant.c.status,
             participant.c.completion_code,
             participant.c.study_version_id,
+            participant.c.mode,
         )
         .join(identity, identity.c.participant_id == participant.c.id)
-        .where(participant.c.study_id == study_id, participant.c.mode == mode)
+        .where(participant.c.study_id == study_id, participant.c.mode != ROBOT)
         .where(identity.c.marketplace == marketplace)
         .order_by(participant.c.id)
     )
     found = [OursRow._make(row) for row in db.read(entered)]
     known = {row.external_hash for row in found}
-    refused = select(refusal.c.external_hash, refusal.c.status).where(
-        refusal.c.study_id == study_id, refusal.c.mode == mode
+    refused = select(refusal.c.external_hash, refusal.c.status, refusal.c.mode).where(
+        refusal.c.study_id == study_id, refusal.c.mode != ROBOT
     )
     refusals = [tuple(row) for row in db.read(refused)]
     return found + [
-        OursRow("", who, None, status, None, None) for who, status in refusals if who not in known
+        OursRow("", who, None, status, None, None, mode) for who, status, mode in refusals if who not in known
     ]
 
 

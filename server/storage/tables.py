@@ -204,6 +204,16 @@ refusal = Table(
     text("on_date"),
 )
 
+erased = Table(
+    "erased",
+    metadata,
+    Column("study_id", Integer, ForeignKey("study.id"), primary_key=True),
+    Column("mode", Text, primary_key=True),
+    Column("arm", Text, primary_key=True),
+    Column("standing", Text, primary_key=True),
+    Column("people", Integer, nullable=False),
+)
+
 posting = Table(
     "posting",
     metadata,

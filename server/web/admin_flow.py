@@ -17,6 +17,7 @@ LABELS: Mapping[Stage, str] = {
     Stage.REJECTED: "rejected by the marketplace",
     Stage.ABANDONED: "left without a word",
     Stage.IN_PROGRESS: "still taking part",
+    Stage.ERASED: "erased, at their wish",
     Stage.FINISHED: "Went through everything",
     Stage.ATTENTION_FAILED: "failed the attention checks",
     Stage.ANALYSED: "Analysed",

@@ -15,7 +15,7 @@ from server.domain.errors import NotFoundError
 from server.domain.money import shown
 from server.domain.study import StudyDefinition
 from server.recruitment import mturk, personal
-from server.recruitment.recognition import marketplace_of, recognise
+from server.recruitment.recognition import marketplace_of
 from server.services import enrol
 from server.services.enrol import DeviceReport, Enrolled, Entry, Refused
 from server.services.lab import Lab
@@ -111,7 +111,7 @@ def decided(
 def refused(lab: Lab, done: Refused, params: Mapping[str, str]) -> Response:
     """What is told to who does not take part; what to hand in and the way back where there is one."""
     hosts = mturk.submit_hosts(lab.settings.mturk_extra_host)
-    arrival = recognise(params)
+    arrival = enrol.recognised(lab, done.study.slug, params)
     page = ends.refused_page(done.study, done.status, arrival, params.get("reason", ""), hosts)
     return html(page, frames=frames(lab, params), forms=hosts if frames(lab, params) else ())
 

@@ -16,6 +16,7 @@ from server.cli import MODELS_COMMANDS
 from server.services import enrol
 from server.services.lab import Lab
 from server.settings import Settings
+from server.storage import postings
 from tests.server.services.steps import DESKTOP, prolific
 
 REPOSITORY = Path(__file__).parents[2]
@@ -95,6 +96,8 @@ def test_a_password_from_the_environment_is_not_printed(hatlab: Shell) -> None:
         (("invite", "parent-child"), "either --names FILE or --count N"),
         (("invite", "parent-child", "--count", "1", "--names", "x"), "either --names FILE or --count N"),
         (("export", "parent-child", "--out", "x"), "run `hatlab init`"),
+        (("poll", "no-such-study"), "run `hatlab init`"),
+        (("poll", "--every", "1"), "5"),
         (("erase", "parent-child"), "name one person"),
         (("erase", "parent-child", "--participant", "P1", "--marketplace", "m"), "name one person"),
         (("erase", "parent-child", "--external-id", "ada"), "name one person"),
@@ -268,6 +271,25 @@ def test_every_command_of_the_science_is_mounted() -> None:
     assert sorted(MODELS_COMMANDS) == sorted(group.commands)
 
 
+def test_polling_says_of_each_posting_how_it_stands_and_by_its_exit_code_whether_all_could_be_asked(
+    initialised: Shell,
+) -> None:
+    nothing = initialised("poll")
+    assert (nothing.returncode, nothing.stdout) == (0, "no posting to ask about\n"), nothing.stderr
+    unknown = initialised("poll", "no-such-study")
+    assert (unknown.returncode, unknown.stderr.count("\n")) == (2, 1)
+    lab = Lab.without_agents(Settings(database_url=initialised.settings["HATLAB_DATABASE_URL"]))
+    with lab.database.writing() as db:
+        postings.add(db, 1, "prolific", "abc", "active", 3, "{}", lab.now_utc())
+    lab.database.close()
+    in_test_mode = initialised("poll").stdout  # the paper's studies are: asked about only by name
+    assert in_test_mode == "no posting to ask about\n"
+    done = [initialised("poll", study) for study in ("parent-child", "traffic-junction")]
+    assert sorted(each.returncode for each in done) == [0, 1]
+    told = next(each.stdout for each in done if each.returncode)
+    assert "Prolific abc: no account at Prolific" in told
+
+
 def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:
     done = hatlab("--help")
     assert done.returncode == 0, done.stderr
@@ -277,6 +299,7 @@ def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:
         "verify",
         "export",
         "erase",
+        "poll",
         "simulate",
         "fake-prolific",
         "invite",

@@ -1,5 +1,6 @@
 """Every pair of states has a result; money is proposed only where it is owed, and nobody is ever rejected."""
 
+from dataclasses import replace
 from typing import get_args
 
 import pytest
@@ -13,6 +14,7 @@ from server.domain.reconciliation import (
     Mismatch,
     Ours,
     OverCapError,
+    Site,
     Theirs,
     check_caps,
     mismatches,
@@ -34,7 +36,7 @@ STATES = get_args(SubmissionState)
 
 
 def ours(status: str, bonus: int = 0, code: str = "CODE") -> Ours:
-    return Ours("P1", "h1", "s1", status, code, bonus)
+    return Ours("P1", "h1", "s1", status, code, bonus, partial_minor=50)
 
 
 def between(status: str, state: str, bonus: int = 0, code: str = "CODE") -> list[Mismatch]:
@@ -140,3 +142,28 @@ def test_caps_hold_for_person_and_study(amount: int, person: int, study: int) ->
     else:
         with pytest.raises(OverCapError):
             check_caps(PAY, amount, person, study)
+
+
+@pytest.mark.parametrize(
+    ("status", "state", "proposed"),
+    [
+        ("withdrawn", "awaiting_review", [("approve", 300)]),
+        ("withdrawn", "approved", []),
+        ("timed_out", "awaiting_review", [("look", 0)]),
+        (ACTIVE, "awaiting_review", [("look", 0)]),
+        ("finished", "awaiting_review", [("approve", 300)]),
+    ],
+)
+def test_where_only_the_whole_reward_can_be_paid_nothing_is_paid_beside_it(
+    status: str, state: str, proposed: list[tuple[str, int]]
+) -> None:
+    whole = Site(lists_everybody=False, pays_in_parts=False)
+    found = mismatches([ours(status)], [Theirs("s1", "h1", state, "CODE")], {}, PAY, whole)
+    assert [(each.action, each.amount_minor) for each in found] == proposed
+
+
+def test_who_came_in_by_another_posting_need_not_be_in_this_ones_list() -> None:
+    other = replace(ours("finished"), must_be_listed=False)
+    assert mismatches([other], [], {}, PAY) == []
+    (second,) = mismatches([other], [Theirs("s2", "h1", "awaiting_review", "")], {}, PAY)
+    assert (second.submission_id, second.action) == ("s2", "ask_return")

@@ -6,11 +6,12 @@ import pytest
 from sqlalchemy import func, insert, select
 
 from server.domain.errors import BadInputError, NotFoundError
-from server.services import enrol, erase, watch
+from server.domain.flow import Stage
+from server.services import enrol, erase, flow, watch
 from server.services.erase import Known
 from server.services.lab import Lab
 from server.services.verify import verify
-from server.storage import postings
+from server.storage import postings, studies
 from server.storage.database import Database
 from server.storage.postings import PaymentRow, SubmissionRow
 from server.storage.tables import metadata, payment
@@ -89,10 +90,30 @@ def test_nothing_of_the_person_is_left_and_everybody_else_stays(lab: Lab) -> Non
     assert known.rows["rounds"] == 4
     assert "4 rounds" in known.text
     gone(lab, known)
-    assert rows(lab) == before
+    gone(lab, known)  # a second time, from another window: nobody is counted twice
+    assert rows(lab) == before | {"erased": 1}
     assert verify(lab).clean
     with pytest.raises(NotFoundError, match="is known under that id"):
         found(lab, "ada")
+
+
+def counts(lab: Lab) -> dict[str, int]:
+    """The flow of the study's live people, without the stages that nobody came to."""
+    with lab.database.reading() as db:
+        row = studies.by_slug(db, SLUG)
+        assert row is not None
+        [live] = flow.flows(db, row.id, lab.now(), ["live"])
+    assert sum(arm[Stage.ERASED] or 0 for arm in live.arms.values()) == live.whole[Stage.ERASED]
+    return {stage.value: people for stage, people in live.whole.items() if people}
+
+
+def test_whoever_was_erased_is_still_counted_in_the_flow_and_only_as_erased(lab: Lab) -> None:
+    launch(lab, definition(SLUG, whole=True))
+    for name in ("ada", "bob", "eve"):
+        come_in(lab, SLUG, name)
+    gone(lab, found(lab, "ada"))
+    gone(lab, found(lab, "eve"))
+    assert counts(lab) == {"consented": 3, "in_progress": 1, "erased": 2}
 
 
 def test_of_payments_only_the_money_stays(lab: Lab) -> None:
@@ -126,6 +147,7 @@ def test_whoever_declined_is_found_by_the_marketplaces_id_and_may_be_asked_anew(
     assert "declined" in known.text
     gone(lab, known)
     assert rows(lab)["refusal"] == 0
+    assert counts(lab)["declined"] == 1
     with lab.database.reading() as db:
         assert enrol.entry(db, lab, SLUG, prolific("eve")).kind == "consent"
 

@@ -3,6 +3,7 @@
 import csv
 import json
 from collections import Counter
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from server.services.lab import Lab
 from server.services.session import session_of
 from server.storage import participants
 from server.storage.database import Database
-from tests.fakes import FakeClock, definition, fake_lab
+from tests.fakes import FakeClock, definition, fake_bundle, fake_lab
 from tests.server.services.steps import DESKTOP, come_in, launch, prolific
 from tests.server.services.walks import (
     TIMED,
@@ -154,6 +155,14 @@ def test_without_the_agent_marks_are_exported_unscored_and_the_manifest_names_it
     assert manifest["agents_not_loaded"] == ["parent_child/onehot-9", "parent_child/prototype-9"]
 
 
+def test_marks_are_not_scored_against_another_agent_of_the_same_name(lab: Lab, tmp_path: Path) -> None:
+    walk_to(lab, entered(lab, SLUG), at_end)
+    others = {name: fake_bundle(name, seed=2) for name in lab.bundles}
+    rows = exported(replace(lab, bundles=others), tmp_path / "out")["probe"]
+    assert len(rows) == 9
+    assert {row["probability"] for row in rows} == {""}
+
+
 def test_window_events_and_the_journey_come_in_order(lab: Lab, tmp_path: Path) -> None:
     key = entered(lab, "traffic-junction")
     with lab.database.writing() as db:
@@ -273,6 +282,7 @@ def test_the_flow_adds_up_from_consent_to_analysis_and_is_the_same_in_the_manife
         "rejected": "1",
         "abandoned": "0",
         "in_progress": "1",
+        "erased": "0",
         "finished": "2",
         "attention_failed": "1",
         "analysed": "1",

@@ -2,8 +2,8 @@
 
 import pytest
 
-from server.domain.errors import ClosedError
-from server.services import enrol, leave, watch
+from server.domain.errors import ClosedError, NotFoundError
+from server.services import enrol, erase, leave, play, watch
 from server.services.lab import Lab
 from server.services.play import PageChange
 from server.services.verify import verify
@@ -96,3 +96,47 @@ def test_whoever_has_finished_stays_finished(lab: Lab) -> None:
     withdraw(lab, key, keep=False)
     assert person(lab, key) == finished
     assert left(lab, key)[0] == 3
+
+
+def test_what_was_deleted_does_not_come_back_by_what_was_under_way(lab: Lab) -> None:
+    key = entered(lab, SLUG)
+    walk_to(lab, key, on("play"))
+    under_way = person(lab, key)  # read by another worker before the person withdrew
+    withdraw(lab, key, keep=False)
+    with lab.database.writing() as db:
+        assert isinstance(play.open_round(db, lab, under_way, None), PageChange)
+    with lab.database.writing() as db:
+        assert watch.keep(db, lab, under_way, "visit-0003", "play:1", [(0, "blur", "", 1.0)]) == 0
+    assert left(lab, key) == (0, 0, 0)
+
+
+def test_a_step_that_meets_a_withdrawal_is_told_that_the_session_is_over(
+    lab: Lab, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    key = entered(lab, SLUG)
+    walk_to(lab, key, on("play"))
+    view = open_round(lab, key)
+    assert isinstance(view, dict)
+    before = play.step
+
+    def slow_step(*args: object) -> object:
+        withdraw(lab, key, keep=False)
+        return before(*args)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(play, "step", slow_step)
+    with pytest.raises(ClosedError, match="over"):
+        decide(lab, key, view, view["actions"][0])
+    assert left(lab, key) == (0, 0, 0)
+
+
+def test_who_was_erased_meanwhile_has_no_session_any_more(lab: Lab) -> None:
+    key = entered(lab, SLUG)
+    under_way = person(lab, key)
+    with lab.database.reading() as db:
+        who = erase.find_participant(db, lab, SLUG, under_way.id)
+    with lab.database.writing() as db:
+        erase.erase(db, who)
+    with pytest.raises(NotFoundError), lab.database.writing() as db:
+        leave.withdraw(db, lab, under_way, keep=False)
+    with pytest.raises(NotFoundError), lab.database.writing() as db:
+        watch.keep(db, lab, under_way, "visit-0004", "play:1", [(0, "blur", "", 1.0)])

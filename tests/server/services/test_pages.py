@@ -104,3 +104,12 @@ def test_everything_that_was_played_is_there_at_the_end(lab: Lab) -> None:
     key = playing(lab, "traffic-junction")
     play_all(lab, key)
     assert page(lab, key).progress.rounds_over == page(lab, key).progress.rounds == 3
+
+
+def test_nobody_gets_past_an_attention_check_and_is_stuck_without_it(lab: Lab) -> None:
+    asked = {"key": "look", "text": "Choose B.", "options": ["A", "B"], "answer": 2, "after": 1}
+    key = playing(lab, "traffic-junction", trials_per_block=1, attention=[asked])
+    play_block(lab, key)
+    assert page(lab, key).kind == "form"
+    assert go_on(lab, key) == "play:1"
+    assert page(lab, key).kind == "form"

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 from pydantic import SecretStr
+from sqlalchemy import update
 
 from server.domain.errors import BadInputError, NotReadyError
 from server.recruitment.recruiter import Change, Submission
@@ -21,6 +22,7 @@ from server.simulate.fake_prolific_market import Market
 from server.simulate.fake_prolific_weather import Weather
 from server.storage import journeys, postings, studies
 from server.storage.database import Database
+from server.storage.tables import participant, payment
 from tests.fakes import FakeClock, definition, fake_lab
 from tests.server.recruitment.contract import Taken
 from tests.server.recruitment.prolific_people import FakePeople
@@ -301,12 +303,73 @@ def test_a_study_without_pay_is_not_offered(sqlite_database: Database) -> None:
 
 def test_robots_and_tests_are_never_reconciled_with_people(site: Site) -> None:
     taken, key = site.finish()
-    from sqlalchemy import update
-
-    from server.storage.tables import participant
-
     with site.lab.database.writing() as db:
         db.write(update(participant).values(mode="robot"))
         assert session_of(db, site.lab, enrol.participant_by_key(db, site.lab, key))
     assert site.proposed() == [("ask_return", 0)]
     assert site.people.rewards(taken) == 0
+
+
+def newer(site: Site, **pay: int) -> None:
+    """The same study launched once more, with another pay."""
+    changed = definition(SLUG, trials_per_block=1, codes=CODES, pay=PAY | pay)
+    with site.lab.database.writing() as db:
+        study = studies.by_slug(db, SLUG)
+        assert study is not None
+        studies.add_version(db, study.id, changed.canonical, changed.sha256, site.lab.now_utc())
+
+
+def withdrawn(site: Site) -> Taken:
+    taken, key = site.arrive()
+    with site.lab.database.writing() as db:
+        leave.withdraw(db, site.lab, enrol.participant_by_key(db, site.lab, key), keep=True)
+    return taken
+
+
+def test_a_later_version_does_not_change_the_partial_pay_that_was_promised(site: Site) -> None:
+    withdrawn(site)
+    newer(site, partial_minor=90)
+    assert ("partial", 50) in site.proposed()
+
+
+def test_a_payment_that_was_begun_is_tried_again_with_its_own_amount(
+    url: str, people: FakePeople, sqlite_database: Database
+) -> None:
+    clock = FakeClock()
+    site = site_at(url, people, sqlite_database)
+    site.lab = replace(site.lab, now=clock)
+    taken = withdrawn(site)
+    people.plan_fault(match="/pay", status=500)
+    site.confirm_all("partial")
+    with site.lab.database.writing() as db:
+        db.write(update(payment).values(amount_minor=40))
+    assert list(people.bonuses(taken)) == []
+    clock.now += timedelta(hours=2)
+    (late,) = site.confirm_all("partial")
+    assert late.done, late
+    assert list(people.bonuses(taken)) == [40]
+
+
+def test_people_of_a_study_that_went_live_after_it_was_posted_are_paid(
+    url: str, people: FakePeople, sqlite_database: Database
+) -> None:
+    site = site_at(url, people, sqlite_database)
+    with site.lab.database.writing() as db:
+        study = studies.by_slug(db, SLUG)
+        assert study is not None
+        studies.set_mode(db, study.id, "test")
+    site.finish()
+    with site.lab.database.writing() as db:
+        studies.set_mode(db, study.id, "live")
+    site.finish()
+    assert [action for action, _ in site.proposed() if action != "bonus"] == ["approve", "approve"]
+
+
+def test_a_second_posting_of_a_study_does_not_miss_the_people_of_the_first(site: Site) -> None:
+    site.arrive()
+    site.found()
+    other = recruit.create(site.lab, SLUG, "prolific", 2, "The same again, later in the year.")
+    assert other != site.posting_id
+    recruit.poll(site.lab, other)
+    with site.lab.database.reading() as db:
+        assert reconcile.look(db, site.lab, other).mismatches == ()

@@ -5,9 +5,8 @@ import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import func, select
-from sqlalchemy.exc import IntegrityError
 
-from server.domain.errors import NotReadyError
+from server.domain.errors import ClosedError, NotReadyError
 from server.storage import events, installation, studies
 from server.storage.database import Database
 from server.storage.events import EventRow
@@ -168,7 +167,7 @@ def test_two_processes_wait_for_each_other_too(sqlite_database: Database) -> Non
 
 
 def test_an_event_without_its_trial_is_refused(database: Database) -> None:
-    with pytest.raises(IntegrityError), database.writing() as db:
+    with pytest.raises(ClosedError), database.writing() as db:
         events.append(db, EventRow("nowhere", 0, "{}", "", ""))
     with database.reading() as db:
         assert db.read(select(func.count()).select_from(event)).scalar_one() == 0

@@ -60,3 +60,13 @@ def test_somebody_who_forgot_the_tick_is_still_who_they_are(lab: Lab) -> None:
     again = client.post(f"/s/{SLUG}/consent", data=forgotten)
     assert again.status_code == 422
     assert hidden_fields(again.text)["invite"] == invited(lab)["invite"]
+
+
+def test_who_declines_a_personal_link_is_told_as_somebody_who_was_named(lab: Lab) -> None:
+    launch(lab, definition(SLUG, codes={"screened_out": "NO-DEVICE", "failed": "", "withdrawn": ""}))
+    client = client_of(lab)
+    screened = client.post(f"/s/{SLUG}/screened", data={**invited(lab), "reason": "phone"})
+    assert "NO-DEVICE" in screened.text
+    assert "NO-DEVICE" in client.get(f"/s/{SLUG}", params=invited(lab)).text
+    nobody = client.post(f"/s/{SLUG}/screened", data={"reason": "phone"})
+    assert "NO-DEVICE" not in nobody.text
