@@ -23,9 +23,10 @@ const ROUNDS = 6;
 /**
  * @param {Page | Locator} what a page's window, or a part of it
  * @param {string} name
+ * @param {{ x: number, y: number, width: number, height: number }} [clip]
  */
-async function picture(what, name) {
-  await what.screenshot({ path: join(FOLDER, `${name}.png`) });
+async function picture(what, name, clip) {
+  await what.screenshot({ path: join(FOLDER, `${name}.png`), ...(clip && { clip }) });
   console.log(join(FOLDER, `${name}.png`));
 }
 
@@ -139,7 +140,7 @@ await served(async (served) => {
     await page.setViewportSize(SIZES.small);
     await page.goto(`${url}/s/parent-child`);
     await passGate(page);
-    await picture(page, "consent");
+    await picture(page, "consent", { x: 0, y: 0, ...SIZES.small, height: 500 });
     await page.setViewportSize(SIZES.large);
     await enter(page, url, "traffic-junction");
     await picture(page, "instructions");
