@@ -338,8 +338,8 @@ def refusal_of(db: DbSession, lab: Lab, visit: Visit) -> RefusalRow | None:
 
 def counts_of(db: DbSession, lab: Lab, visit: Visit) -> dict[tuple[str, str, str], int]:
     """Who holds a place, among people of the same mode: robots never mix with people."""
-    since = canonical.minutes_before(lab.now(), visit.study.lease_min)
-    cells = participants.holding_places(db, visit.row.id, visit.mode, since)
+    leases = lease.began(db, lab, visit.row.id)
+    cells = participants.holding_places(db, visit.row.id, visit.mode, leases)
     return {(cell.arm, cell.role_order, cell.device): cell.people for cell in cells}
 
 

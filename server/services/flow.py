@@ -11,6 +11,7 @@ from server.domain.study import from_json
 from server.storage import erasure, headcounts, refusals, studies
 from server.storage.database import DbSession
 from server.storage.headcounts import Stand
+from server.storage.studies import VersionRow
 
 Counts = Mapping[Stage, int | None]
 AWAY = "away"
@@ -26,10 +27,10 @@ class Flow:
 
 
 def flows(db: DbSession, study_id: int, now: datetime, modes: Sequence[str]) -> list[Flow]:
-    """The flow of each mode, over all versions; each version's own lease tells who has left."""
+    """The flow of each mode, over all versions; the lease that each person agreed to tells who has left."""
     versions = studies.versions(db, study_id)
     arms = list(dict.fromkeys(arm.name for row in versions for arm in from_json(row.definition).arms))
-    stands = [stand for row in versions for stand in stands_of(db, row.id, row.definition, now)]
+    stands = list(stands_of(db, study_id, versions, now))
     found = []
     for mode in modes:
         gone = erasure.counted(db, study_id, mode)
@@ -46,9 +47,9 @@ def flows(db: DbSession, study_id: int, now: datetime, modes: Sequence[str]) -> 
     return found
 
 
-def stands_of(db: DbSession, version_id: int, definition: str, now: datetime) -> Iterator[Stand]:
-    began_utc = canonical.minutes_before(now, from_json(definition).lease_min)
-    for stand in headcounts.stands(db, version_id, began_utc):
+def stands_of(db: DbSession, study_id: int, versions: Sequence[VersionRow], now: datetime) -> Iterator[Stand]:
+    leases = {row.id: canonical.minutes_before(now, from_json(row.definition).lease_min) for row in versions}
+    for stand in headcounts.stands(db, study_id, leases):
         yield stand._replace(standing=ABANDONED) if stand.standing == AWAY else stand
 
 

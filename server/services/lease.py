@@ -41,7 +41,17 @@ def claim(db: DbSession, lab: Lab, participant: ParticipantRow) -> bool:
 def is_free(db: DbSession, lab: Lab, participant: ParticipantRow) -> bool:
     """Whether the participant's arm has a place that nobody holds."""
     study = definition_of(db, lab, participant.study_version_id)
-    since_utc = canonical.minutes_before(lab.now(), study.lease_min)
-    cells = participants.holding_places(db, participant.study_id, participant.mode, since_utc)
+    leases = began(db, lab, participant.study_id)
+    cells = participants.holding_places(db, participant.study_id, participant.mode, leases)
     held = sum(cell.people for cell in cells if cell.arm == participant.arm)
     return held < study.arm(participant.arm).places
+
+
+def began(db: DbSession, lab: Lab, study_id: int) -> dict[int, str]:
+    """By version of a study since when somebody who holds a place must have been seen.
+
+    Each person keeps the lease of the version that they agreed to, whatever a later one says.
+    """
+    now = lab.now()
+    versions = [row.id for row in studies.versions(db, study_id)]
+    return {key: canonical.minutes_before(now, definition_of(db, lab, key).lease_min) for key in versions}

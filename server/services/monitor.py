@@ -8,6 +8,7 @@ from datetime import datetime
 from server.domain import canonical
 from server.domain.plan import page_kind
 from server.domain.study import from_json
+from server.services import lease
 from server.services.lab import Lab
 from server.services.studies import Study
 from server.storage import headcounts, studies
@@ -96,7 +97,7 @@ class Progress:
 
 def counts(db: DbSession, lab: Lab, study: Study) -> Progress:
     """Count a study. A study that was never launched has no arms here and nobody in it."""
-    found = headcounts.tallies(db, study.row.id, seen_since(lab, study))
+    found = headcounts.tallies(db, study.row.id, lease.began(db, lab, study.row.id))
     versions = studies.versions(db, study.row.id)
     places = {version.number: from_json(version.definition).arms for version in versions}
     newest = versions[-1].number if versions else 0
@@ -112,12 +113,6 @@ def counts(db: DbSession, lab: Lab, study: Study) -> Progress:
     total = study.definition.places if study.definition else 0
     modes = {mode: mode_counts([tally for tally in found if tally.mode == mode], total) for mode in MODES}
     return Progress(modes, arms, newest)
-
-
-def seen_since(lab: Lab, study: Study) -> str:
-    """Whoever was last seen before has lost the place, by the newest version's rule."""
-    lease_min = study.definition.lease_min if study.definition else 0
-    return canonical.minutes_before(lab.now(), lease_min)
 
 
 def arm_count(version: int, newest: int, arm: str, places: int, tallies: Sequence[Tally]) -> ArmCount:
@@ -158,7 +153,8 @@ def split(pairs: Iterable[tuple[str, int]]) -> tuple[tuple[str, int], ...]:
 
 def people(db: DbSession, lab: Lab, study: Study, mode: str, show: str) -> tuple[PersonLine, ...]:
     """The last seen of a mode: who plays now, has finished, has left, or is excluded."""
-    rows = headcounts.people(db, study.row.id, mode, SHOWS[show], seen_since(lab, study), PEOPLE_MAX)
+    leases = lease.began(db, lab, study.row.id)
+    rows = headcounts.people(db, study.row.id, mode, SHOWS[show], leases, PEOPLE_MAX)
     rounds = {each.number: rounds_of(each.definition) for each in studies.versions(db, study.row.id)}
     return tuple(person_line(row, rounds[row.version], lab.now()) for row in rows)
 

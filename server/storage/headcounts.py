@@ -1,10 +1,12 @@
 """Who is where in a study, counted in the database. Every count is by mode: people and robots never mix."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from sqlalchemy import Label, case, func, select
 
 from server.storage.database import DbSession
+from server.storage.participants import is_away
 from server.storage.tables import participant, study_version, trial
 
 
@@ -44,19 +46,18 @@ class Person(NamedTuple):
     rounds_done: int
 
 
-def standing(seen_since_utc: str) -> Label[str]:
-    is_away = (participant.c.status == "active") & (participant.c.last_seen_utc < seen_since_utc)
-    return case((is_away, "away"), else_=participant.c.status).label("standing")
+def standing(leases: Mapping[int, str]) -> Label[str]:
+    return case((is_away(leases), "away"), else_=participant.c.status).label("standing")
 
 
-def tallies(db: DbSession, study_id: int, seen_since_utc: str) -> list[Tally]:
+def tallies(db: DbSession, study_id: int, leases: Mapping[int, str]) -> list[Tally]:
     cell = (
         study_version.c.number,
         participant.c.mode,
         participant.c.arm,
         participant.c.role_order,
         participant.c.device,
-        standing(seen_since_utc),
+        standing(leases),
     )
     statement = (
         select(*cell, func.count(), func.max(participant.c.last_seen_utc))
@@ -67,23 +68,20 @@ def tallies(db: DbSession, study_id: int, seen_since_utc: str) -> list[Tally]:
     return [Tally._make(row) for row in db.read(statement)]
 
 
-def stands(db: DbSession, study_version_id: int, seen_since_utc: str) -> list[Stand]:
-    """Everybody of one version, whose lease began then."""
-    cell = (participant.c.mode, participant.c.arm, standing(seen_since_utc))
+def stands(db: DbSession, study_id: int, leases: Mapping[int, str]) -> list[Stand]:
+    """Everybody of a study, whose leases began then, by version."""
+    cell = (participant.c.mode, participant.c.arm, standing(leases))
     statement = (
-        select(*cell, func.count())
-        .where(participant.c.study_version_id == study_version_id)
-        .group_by(*cell)
-        .order_by(*cell)
+        select(*cell, func.count()).where(participant.c.study_id == study_id).group_by(*cell).order_by(*cell)
     )
     return [Stand._make(row) for row in db.read(statement)]
 
 
 def people(
-    db: DbSession, study_id: int, mode: str, standings: tuple[str, ...], seen_since_utc: str, most: int
+    db: DbSession, study_id: int, mode: str, standings: tuple[str, ...], leases: Mapping[int, str], most: int
 ) -> list[Person]:
     """The last seen first, with the rounds that each has ended (practice included)."""
-    where = standing(seen_since_utc)
+    where = standing(leases)
     ended = (
         select(func.count())
         .where(trial.c.participant_id == participant.c.id, trial.c.ended_utc.is_not(None))

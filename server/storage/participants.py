@@ -1,9 +1,9 @@
 """Rows of participants. No marketplace id stands here; see `enrolments`."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from sqlalchemy import bindparam, func, insert, or_, select, update
+from sqlalchemy import ColumnElement, bindparam, case, func, insert, literal, or_, select, update
 
 from server.domain.errors import NotFoundError
 from server.storage.database import DbSession
@@ -133,8 +133,17 @@ def blank(db: DbSession, participant_id: str, now_utc: str) -> None:
     )
 
 
-def holding_places(db: DbSession, study_id: int, mode: str, seen_since_utc: str) -> list[CellCount]:
-    """How many people hold a place, by arm, role order and device class: finished, or seen since then."""
+def is_away(leases: Mapping[int, str]) -> ColumnElement[bool]:
+    """Whether somebody who has come to no end was last seen before the lease of their own study version.
+
+    `leases`: when it began, by study version.
+    """
+    began_utc = case(dict(leases), value=participant.c.study_version_id, else_="") if leases else literal("")
+    return (participant.c.status == "active") & (participant.c.last_seen_utc < began_utc)
+
+
+def holding_places(db: DbSession, study_id: int, mode: str, leases: Mapping[int, str]) -> list[CellCount]:
+    """How many people hold a place, by arm, role order and device class: finished, or not away."""
     cell = (participant.c.arm, participant.c.role_order, participant.c.device)
     statement = (
         select(*cell, func.count())
@@ -142,7 +151,7 @@ def holding_places(db: DbSession, study_id: int, mode: str, seen_since_utc: str)
         .where(
             or_(
                 participant.c.status == "finished",
-                (participant.c.status == "active") & (participant.c.last_seen_utc >= seen_since_utc),
+                (participant.c.status == "active") & ~is_away(leases),
             )
         )
         .group_by(*cell)

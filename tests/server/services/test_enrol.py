@@ -246,7 +246,7 @@ def test_arms_and_orders_are_balanced_within_device_class(sqlite_database: Datab
         device = DeviceReport("desktop" if index % 2 else "tablet", "B", "1x1")
         agree(lab, "parent-child", prolific(f"p{index}"), device=device)
     with lab.database.reading() as db:
-        cells = participants.holding_places(db, 1, "live", "")
+        cells = participants.holding_places(db, 1, "live", {})
     assert sum(cell.people for cell in cells) == 64
     assert len(cells) == 8
     assert max(c.people for c in cells) - min(c.people for c in cells) <= 5

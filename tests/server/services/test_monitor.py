@@ -7,9 +7,10 @@ from itertools import product
 import pytest
 
 from server.domain import canonical
+from server.domain.flow import Stage
 from server.domain.participation import ENDS
 from server.domain.plan import plan
-from server.services import monitor, studies
+from server.services import flow, lease, monitor, studies
 from server.services.lab import Lab
 from server.services.monitor import MODES, ago, where
 from server.storage import participants
@@ -124,6 +125,25 @@ def test_people_of_an_earlier_version_are_shown_apart_but_still_hold_their_place
         (1, "prototype", 1),
     ]
     assert arms[0].free == arms[0].places - 2
+
+
+def test_everybody_keeps_the_lease_of_the_version_that_they_entered(lab: Lab, study_id: int) -> None:
+    away_for_long = {"last_seen_utc": canonical.minutes_before(lab.now(), 45)}
+    put(lab, study_id, 1, **away_for_long)
+    with lab.database.writing() as db:
+        shorter = {**studies.find(db, SLUG).values, "lease_min": 30}
+        studies.save_draft(db, lab, SLUG, shorter)
+    with lab.database.writing() as db:
+        studies.launch(db, lab, SLUG, studies.find(db, SLUG).base)
+    put(lab, study_id, 2, **away_for_long)
+    arms = {arm.version: arm.people for arm in counted(lab).arms["live"] if arm.arm == "prototype"}
+    assert (arms[1].active, arms[1].left) == (1, 0)
+    assert (arms[2].active, arms[2].left) == (0, 1)
+    with lab.database.reading() as db:
+        leases = lease.began(db, lab, study_id)
+        assert sum(cell.people for cell in participants.holding_places(db, study_id, "live", leases)) == 1
+        [live] = flow.flows(db, study_id, lab.now(), ["live"])
+    assert (live.whole[Stage.IN_PROGRESS], live.whole[Stage.ABANDONED]) == (1, 1)
 
 
 def test_a_person_is_listed_where_they_are_with_the_rounds_they_ended(lab: Lab, study_id: int) -> None:
