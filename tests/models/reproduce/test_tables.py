@@ -132,7 +132,7 @@ def test_table_1_asks_for_every_method_on_four_tasks() -> None:
 def test_the_reward_is_the_only_help_of_the_row_that_says_so() -> None:
     (cell,) = tables.load("table1").cells("easy-reinforce-only", seeds=(1,))
     recipe = config.load(tables.PACKAGED.parent / "recipes" / f"{cell.recipe}.toml")
-    assert (recipe.warm_start, recipe.init_from, recipe.start) == (None, None, config.Start())
+    assert (recipe.warm_start, recipe.init_from) == (None, None)
     assert supervised_help(recipe.model_dump(mode="json")) == "none"
 
 
