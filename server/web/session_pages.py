@@ -5,9 +5,11 @@ from dataclasses import replace
 
 from server.domain.forms import Form
 from server.domain.money import bonus_minor, shown
+from server.domain.participation import State as Standing
 from server.domain.questionnaire import Item
 from server.domain.study import StudyDefinition
 from server.services.pages import Page as State
+from server.services.recruiters import promised_minor
 from server.web.pages import Bar, FormPage, InstructionsPage, PlayPage, Question, Rules, WithdrawPage
 
 TRY_AGAIN = "Not everything was right. Please read once more below how to play, and answer again."
@@ -153,9 +155,11 @@ def question(form: Form, item: Item, given: Mapping[str, str], errors: Mapping[s
 
 def withdraw_page(state: State, key: str) -> WithdrawPage:
     pay, texts = state.study.pay, state.study.texts
+    code = state.study.codes.withdrawn
+    part = promised_minor(pay, state.marketplace, Standing.WITHDRAWN, code) if pay else 0
     return WithdrawPage(
         title=state.study.title,
-        partial=shown(pay.partial_minor, pay.currency) if pay and pay.partial_minor else "",
+        partial=shown(part, pay.currency) if pay and part else "",
         action=f"/p/{key}/withdraw",
         back_url=f"/p/{key}",
         language=texts.language,
