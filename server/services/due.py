@@ -1,7 +1,5 @@
 """Which form a participant's page shows now."""
 
-from collections.abc import Sequence
-
 from server.domain import canonical, forms
 from server.domain.forms import Form
 from server.domain.plan import page_kind
@@ -15,6 +13,8 @@ def due_form(db: DbSession, session: Session) -> Form | None:
     """The form that is due; None where rounds or instructions are, or nothing."""
     participant, study = session.participant, session.study
     kind, block = page_kind(participant.page)
+    if kind == "play":
+        return attention_due(db, session)
     handed_in = answers.attempts(db, participant.id)
     if kind == "quiz":
         role = session.plan.of_block(block)[0].role
@@ -25,15 +25,18 @@ def due_form(db: DbSession, session: Session) -> Form | None:
         return next((forms.questionnaire(each, block) for each in missing), None)
     if kind == "probe":
         return None if "probe:0" in handed_in else forms.probe(numbers_of(participant))
-    return attention_due(db, session, list(handed_in)) if kind == "play" else None
+    return None
 
 
-def attention_due(db: DbSession, session: Session, handed_in: Sequence[str]) -> Form | None:
+def attention_due(db: DbSession, session: Session) -> Form | None:
+    """Asked whenever a round begins: what can be told without the database is told without it."""
     if not session.study.attention:
         return None
     rows = trials.of_participant(db, session.participant.id)
     over = sum(row.phase == "main" and row.outcome is not None for row in rows)
-    check = forms.check_due(session.study, over, handed_in)
+    if over < min(check.after for check in session.study.attention):
+        return None
+    check = forms.check_due(session.study, over, list(answers.attempts(db, session.participant.id)))
     return forms.attention(check) if check else None
 
 

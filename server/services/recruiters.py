@@ -5,8 +5,9 @@ from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
 from server.domain.errors import BadInputError, NotReadyError
+from server.domain.money import reward_minor
 from server.domain.reconciliation import Site
-from server.domain.study import StudyDefinition
+from server.domain.study import Pay, StudyDefinition
 from server.recruitment.recruiter import RecruiterError
 from server.services.lab import Lab
 from server.settings import Settings
@@ -19,6 +20,16 @@ if TYPE_CHECKING:
 
 NAMES = {"prolific": "Prolific", "mturk": "Mechanical Turk"}
 SITES = {"prolific": Site(), "mturk": Site(lists_everybody=False, pays_in_parts=False)}
+
+
+def promised_minor(pay: Pay, marketplace: str, status: str, code: str) -> int:
+    """What somebody of this status gets for their time, as far as the marketplace they came from allows.
+
+    Where nothing is paid in parts, whoever hands in a code gets the whole reward, and nobody else anything.
+    """
+    if SITES.get(marketplace, Site()).pays_in_parts:
+        return reward_minor(pay, status)
+    return pay.reward_minor if code else 0
 
 
 def is_connected(settings: Settings, marketplace: str) -> bool:

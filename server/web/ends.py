@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
-from server.domain.money import reward_minor, shown
+from server.domain.money import shown
 from server.domain.participation import WENT_THROUGH
 from server.domain.participation import State as Standing
 from server.domain.study import StudyDefinition
@@ -11,6 +11,7 @@ from server.recruitment import mturk, prolific
 from server.recruitment.arrival import Arrival, ExitLink
 from server.recruitment.recognition import exit_link
 from server.services.pages import Page as State
+from server.services.recruiters import promised_minor
 from server.web.pages import Action, EndPage, Icon
 
 
@@ -187,7 +188,7 @@ def paid_of(state: State) -> tuple[tuple[str, str], ...]:
     if pay is None:
         return ()
     lines = []
-    if reward := reward_minor(pay, state.state):
+    if reward := promised_minor(pay, state.marketplace, state.state, state.code or ""):
         lines.append(("For your time", shown(reward, pay.currency)))
     if state.state in WENT_THROUGH and pay.bonus_success_minor:
         won = f"Bonus for {state.progress.won} of {state.progress.rounds} rounds"

@@ -93,6 +93,18 @@ class ConsentPage:
 
 
 @dataclass(frozen=True, slots=True)
+class Rules:
+    """What is said of a role before it is played."""
+
+    role: Role
+    limit: int
+    child_sees_parent: bool
+    paragraphs: tuple[str, ...]
+    level: Literal[1, 2] = 1
+    """Of the heading."""
+
+
+@dataclass(frozen=True, slots=True)
 class InstructionsPage:
     """How to play one block; `page` goes back as a hidden field of the form to `next_url`."""
 
@@ -106,7 +118,7 @@ class InstructionsPage:
     practice_rounds: int
     limit: int
     child_sees_parent: bool
-    paragraphs: tuple[str, ...]
+    rules: Rules
     page: str
     next_url: str
     quiz: bool
@@ -160,6 +172,8 @@ class FormPage:
     tries_left: int
     items: tuple[Question, ...]
     again: str
+    rules: Rules | None
+    """To be read once more, at a second try of the quiz."""
     error: str
     answers_url: str
     data: Mapping[str, Any]

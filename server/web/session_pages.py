@@ -1,15 +1,18 @@
 """The contexts of the pages that somebody in a study goes through."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 from server.domain.forms import Form
 from server.domain.money import bonus_minor, shown
+from server.domain.participation import State as Standing
 from server.domain.questionnaire import Item
 from server.domain.study import StudyDefinition
 from server.services.pages import Page as State
-from server.web.pages import Bar, FormPage, InstructionsPage, PlayPage, Question, WithdrawPage
+from server.services.recruiters import promised_minor
+from server.web.pages import Bar, FormPage, InstructionsPage, PlayPage, Question, Rules, WithdrawPage
 
-TRY_AGAIN = "Not everything was right. Please read the instructions once more in your mind, and answer again."
+TRY_AGAIN = "Not everything was right. Please read once more below how to play, and answer again."
 LOOK_AGAIN = "Please look at the marked questions."
 
 
@@ -57,7 +60,7 @@ def instructions_page(state: State, key: str) -> InstructionsPage:
         practice_rounds=study.practice_rounds,
         limit=study.step_limit,
         child_sees_parent=study.child_sees_parent,
-        paragraphs=study.texts.instructions,
+        rules=rules(state),
         page=state.name,
         next_url=f"/p/{key}/next",
         quiz=bool(study.quiz_of(state.role)),
@@ -115,6 +118,7 @@ def form_page(state: State, key: str, given: Mapping[str, str], errors: Mapping[
         tries_left=form.tries_left,
         items=tuple(question(form, item, given, errors) for item in form.items),
         again=TRY_AGAIN if form.attempt > 1 else "",
+        rules=replace(rules(state), level=2) if form.attempt > 1 else None,
         error=LOOK_AGAIN if errors else "",
         answers_url=f"/p/{key}/answers",
         data={"events_url": f"/p/{key}/events", "page": state.name, **(state.signs or {})},
@@ -122,6 +126,11 @@ def form_page(state: State, key: str, given: Mapping[str, str], errors: Mapping[
         language=study.texts.language,
         direction=study.texts.direction,
     )
+
+
+def rules(state: State) -> Rules:
+    study = state.study
+    return Rules(state.role, study.step_limit, study.child_sees_parent, study.texts.instructions)
 
 
 def question(form: Form, item: Item, given: Mapping[str, str], errors: Mapping[str, str]) -> Question:
@@ -146,9 +155,11 @@ def question(form: Form, item: Item, given: Mapping[str, str], errors: Mapping[s
 
 def withdraw_page(state: State, key: str) -> WithdrawPage:
     pay, texts = state.study.pay, state.study.texts
+    code = state.study.codes.withdrawn
+    part = promised_minor(pay, state.marketplace, Standing.WITHDRAWN, code) if pay else 0
     return WithdrawPage(
         title=state.study.title,
-        partial=shown(pay.partial_minor, pay.currency) if pay and pay.partial_minor else "",
+        partial=shown(part, pay.currency) if pay and part else "",
         action=f"/p/{key}/withdraw",
         back_url=f"/p/{key}",
         language=texts.language,

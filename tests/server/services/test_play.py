@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from sqlalchemy.event import listen, remove
 
 from server.domain import canonical
 from server.domain.errors import BadInputError, NotFoundError, StaleError
@@ -368,3 +369,27 @@ def test_the_cache_keeps_what_was_used_last() -> None:
     nothing = Recent(0)
     nothing.put("a", 1)
     assert nothing.get("a") is None
+
+
+def statements(lab: Lab, work: Callable[[], object]) -> int:
+    """How many statements the database is sent meanwhile."""
+    sent: list[str] = []
+
+    def note(*of_cursor: Any) -> None:
+        sent.append(of_cursor[2])
+
+    listen(lab.database.engine, "before_cursor_execute", note)
+    try:
+        work()
+    finally:
+        remove(lab.database.engine, "before_cursor_execute", note)
+    return len(sent)
+
+
+def test_a_step_costs_four_statements_and_a_new_round_seven(sqlite_database: Database) -> None:
+    lab = fake_lab(sqlite_database)
+    key = playing(lab, "traffic-junction", trials_per_block=3)
+    ended = play_round(lab, key, begun(lab, key))["round"]
+    assert statements(lab, lambda: open_round(lab, key, ended)) == 7
+    view = begun(lab, key)
+    assert statements(lab, lambda: decide(lab, key, view, first(view))) == 4

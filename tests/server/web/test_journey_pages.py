@@ -156,3 +156,17 @@ def test_an_unfit_device_of_somebody_whom_no_site_named_leads_back_to_the_study(
     page = ends.refused_page(study, "screened_out", Arrival("direct"), "phone")
     assert page.elsewhere == ends.again(study)
     assert page.code == ""
+
+
+def test_who_missed_a_quiz_question_can_read_the_rules_again_beside_it(client: Client) -> None:
+    address = come_in(client, "traffic-junction")
+    go_on(client, address)
+    first = client.get(address).text
+    assert "Which key brakes?" in first
+    assert "Brake with F, go with J" not in first
+    answers(client, address, "quiz:1", brake="2")
+    again = client.get(address).text
+    assert "Please read once more below how to play" in again
+    assert "<h2>Cross the junction" in again
+    assert "Brake with F, go with J" in again
+    assert again.count("<h1") == 1
