@@ -12,7 +12,7 @@ COPY migrations migrations
 COPY static static
 COPY templates templates
 COPY alembic.ini ./
-RUN /venv/bin/pip install --no-cache-dir --constraint constraints.txt --editable .
+RUN /venv/bin/pip install --no-cache-dir --constraint constraints.txt --editable '.[mturk]'
 
 FROM python:3.11-slim-bookworm
 RUN useradd --create-home --uid 10001 hatlab && mkdir -p /app/var && chown hatlab /app/var

@@ -30,7 +30,7 @@ serve: $(RUNTIME) ## install, migrate, make the two demo studies, start the serv
 
 test: $(DEV) $(if $(HAVE_NODE),$(NODE)) ## run all tests (browser tests need Node 20 and Chromium)
 	@.ci/need-browser "$(HAVE_NODE)"
-	$(BIN)/python -m pytest -n $(JOBS) -m "not learn and not torture"
+	$(BIN)/python -m pytest -n $(JOBS) -m "not learn and not torture" --durations=25
 	$(if $(HAVE_NODE),npm test --silent)
 
 check: $(DEV) $(if $(HAVE_NODE),$(NODE)) ## lint, types, floors: what CI checks

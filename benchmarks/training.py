@@ -3,9 +3,10 @@
 Three tables: speed of one core (processor time of whole updates, median of several repeats) beside the floor
 and, where it is known, the public IC3Net code on the same kind of machine; where the time goes; and what two
 processes on two cores do at once (wall time, so that it says little while other programs run). The floor is
-the bare network: forward and backward through every layer on random numbers, as many rows at each step as
-lived in a real update, and nothing else. In Traffic Junction the first policy is set to gas at nineteen steps
-in twenty: brakes at random fill the roads with half as many cars again as training meets.
+the bare network: forward and backward through every layer, on the observations of a real update and random
+memories, and nothing else; equal observations are encoded once, as training does. In Traffic Junction the
+first policy is set to gas at nineteen steps in twenty: brakes at random fill the roads with half as many cars
+again as training meets.
 
 Run: python -m benchmarks.training [--repeats 5] [--updates 3] [--only medium]
 """
@@ -28,8 +29,9 @@ from torch import Tensor
 
 from benchmarks import table
 from models.envs.traffic_junction import TrafficJunction
-from models.policies.recurrent import Memory, RecurrentNet
+from models.policies.recurrent import Memory
 from models.training.allocation import keep_freed_memory
+from models.training.arithmetic import Arithmetic, Seen, distinct
 from models.training.config import Recipe, parse
 from models.training.reinforce import Learner
 from models.training.run import PACKAGED
@@ -102,32 +104,37 @@ def speeds(trainer: Trainer, repeats: int, updates: int, clock: Callable[[], flo
     return found
 
 
-def floor(trainer: Trainer, rows: list[int], steps: int, repeats: int) -> list[float]:
+def floor(trainer: Trainer, sights: list[Seen], steps: int, repeats: int) -> list[float]:
     """Environment steps per second if the bare network were all."""
     found = []
     for _ in range(repeats):
         begun = time.process_time()
-        bare(trainer.learner, rows).backward()
+        bare(trainer.learner, sights).backward()
         found.append(steps / (time.process_time() - begun))
     return found
 
 
-def shapes(trainer: Trainer) -> tuple[list[int], int]:
-    """Rows at each step of one update, and its environment steps."""
+def sights_of(trainer: Trainer) -> tuple[list[Seen], int]:
+    """What living agents saw at each step of one update, and its environment steps."""
     ((seen, _),) = trainer._windows(trainer.phase, trainer.at.total)  # noqa: SLF001 (shares its situations)
-    running = ~np.stack([trainer.env.done(state) for state in seen.states[:-1]])
-    return np.bincount(seen.step).tolist(), int(running.sum())
+    env, sights = trainer.env, []
+    for step, state in enumerate(seen.states[:-1]):
+        observation = env.observe(state).reshape(-1, env.observation_size)[seen.place[seen.step == step]]
+        first, which = distinct(observation)
+        sights.append(Seen(torch.from_numpy(observation[first]), torch.from_numpy(which)))
+    running = ~np.stack([env.done(state) for state in seen.states[:-1]])
+    return sights, int(running.sum())
 
 
-def bare(learner: Learner, rows: list[int]) -> Tensor:
-    """A number that depends on every layer, from random inputs of so many rows at each step."""
-    net: RecurrentNet = learner.net
-    size = net.architecture
+def bare(learner: Learner, sights: list[Seen]) -> Tensor:
+    """A number that depends on every layer, from what agents saw and random memories."""
+    size, work = learner.net.architecture, Arithmetic(learner.net)
     sums, features = [], []
-    for count in rows:
+    for seen in sights:
+        count = len(seen.which)
         memory = Memory(*(torch.randn(count, size.hidden, requires_grad=True) for _ in Memory._fields))
-        said = net.speak(memory, torch.rand(count, size.observation_size))
-        done = net.act(said.memory, said.encoded, said.message)
+        spoken = work.speak(memory, seen)
+        done = work.act(spoken, spoken.said.message)
         features.append(done.features)
         sums += [done.logits.sum(), done.memory.cell1.sum(), done.memory.cell2.sum()]
     together = torch.cat(features)
@@ -200,6 +207,8 @@ class Measured(NamedTuple):
     speeds: list[float]
     rows: float
     """That go through the network, per environment step."""
+    different: float
+    """... and are encoded, because no other agent sees the same at that step."""
     floor: float
     shares: dict[str, float]
 
@@ -208,9 +217,10 @@ def measure(case: Case, repeats: int, updates: int) -> Measured:
     with tempfile.TemporaryDirectory() as folder:
         trainer = opened(parse(case.recipe), folder)
         found = speeds(trainer, repeats, updates, time.process_time)
-        rows, steps = shapes(trainer)
-        bottom = statistics.median(floor(trainer, rows, steps, repeats))
-        return Measured(found, sum(rows) / steps, bottom, shares(trainer, updates))
+        sights, steps = sights_of(trainer)
+        rows, different = (sum(len(seen[part]) for seen in sights) / steps for part in (1, 0))
+        bottom = statistics.median(floor(trainer, sights, steps, repeats))
+        return Measured(found, rows, different, bottom, shares(trainer, updates))
 
 
 def show(cases: list[Case], measured: list[Measured], size: str) -> None:
@@ -221,11 +231,13 @@ def show(cases: list[Case], measured: list[Measured], size: str) -> None:
         public = (f"{case.public:,.0f}", f"{middle / case.public:.1f}x") if case.public else ("", "")
         numbers = (middle, min(found.speeds), max(found.speeds), found.floor)
         shown = (*(f"{number:,.0f}" for number in numbers), f"{middle / found.floor:.2f}")
-        rows.append((case.label, f"{found.rows:.1f}", *shown, *public))
+        agents = (f"{found.rows:.1f}", f"{found.different:.1f}")
+        rows.append((case.label, *agents, *shown, *public))
         parts.append((case.label, *(f"{share:.0%}" for share in found.shares.values())))
     columns = (
         "",
         "agents a step",
+        "encoded",
         "steps/s",
         "slowest",
         "fastest",

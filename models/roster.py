@@ -24,6 +24,9 @@ ABOUT = {
     "traffic_junction": """\
 Traffic Junction. Success: no car collided in the whole episode. *Human trials* begin among 5 to 9 driving
 cars; *arrived* is the car in the participant's seat, here driven by the policy.""",
+    "predator_prey": """\
+Predator-Prey. *Reward* is summed over an episode, mean over the predators;
+success: all are on the prey at the end. Rewards of different grids do not compare.""",
 }
 COLUMNS = {
     "parent_child": {
@@ -41,21 +44,47 @@ COLUMNS = {
         "human trials: success": ("human", "success"),
         "message rate": ("as_trained", "message_rate"),
     },
+    "predator_prey": {
+        "reward": ("as_trained", "reward"),
+        "reward, masked": ("masked", "reward"),
+        "success": ("as_trained", "success"),
+        "message rate": ("as_trained", "message_rate"),
+        "tokens in use": ("as_trained", "tokens_used"),
+    },
 }
 """By task folder: heading, and row and measure of evaluation.json."""
+OF_ANY_TASK = {
+    "success": ("as_trained", "success"),
+    "success, masked": ("masked", "success"),
+    "reward": ("as_trained", "reward"),
+    "reward, masked": ("masked", "reward"),
+    "message rate": ("as_trained", "message_rate"),
+}
+"""The same for a task that nobody has described here: what every evaluation holds."""
 
 
 def page(root: Path = BUNDLES) -> str:
-    """Give the whole page."""
-    parts = [HEAD]
-    for task, columns in COLUMNS.items():
-        lines = [line(folder, columns) for folder in sorted((root / task).glob("*/")) if folder.is_dir()]
-        head = ["agent", "warm start", "episodes", *columns]
-        rule = "|---|---|" + "---:|" * (len(head) - 2)
-        parts.append(
-            "\n".join([f"## {task}", "", ABOUT[task], "", f"| {' | '.join(head)} |", rule, *lines, ""])
-        )
-    return "\n".join(parts)
+    """Give the whole page: a table for each task that has agents, described tasks first."""
+    agents = {task: _agents(root / task) for task in [*COLUMNS, *_others(root)]}
+    return "\n".join([HEAD, *(table(task, folders) for task, folders in agents.items() if folders)])
+
+
+def _others(root: Path) -> list[str]:
+    return sorted(folder.name for folder in root.glob("*/") if folder.name not in COLUMNS)
+
+
+def _agents(task: Path) -> list[Path]:
+    return sorted(path.parent for path in task.glob("*/manifest.json"))
+
+
+def table(task: str, folders: list[Path]) -> str:
+    """Give the section of one task."""
+    columns = COLUMNS.get(task, OF_ANY_TASK)
+    head = ["agent", "warm start", "episodes", *columns]
+    about = [ABOUT[task], ""] if task in ABOUT else []
+    rule = "|---|---|" + "---:|" * (len(head) - 2)
+    lines = [line(folder, columns) for folder in folders]
+    return "\n".join([f"## {task}", "", *about, f"| {' | '.join(head)} |", rule, *lines, ""])
 
 
 def line(folder: Path, columns: dict[str, tuple[str, str]]) -> str:
@@ -64,13 +93,17 @@ def line(folder: Path, columns: dict[str, tuple[str, str]]) -> str:
         json.loads((folder / file).read_text(encoding="utf-8"))
         for file in ("evaluation.json", "manifest.json")
     )
-    cells = [cell(evaluation["rows"][row][measure], measure) for row, measure in columns.values()]
+    rows = evaluation["rows"]
+    cells = [cell(rows.get(row, {}).get(measure), measure) for row, measure in columns.values()]
     start = manifest["warm_start"] or "none"
     episodes = f"{evaluation['episodes']:,}"
     return f"| {' | '.join([f'`{folder.name}`', start, episodes, *cells])} |"
 
 
-def cell(measure: dict[str, Any], name: str) -> str:
+def cell(measure: dict[str, Any] | None, name: str) -> str:
+    """A measure with its interval; a dash where nobody measured it."""
+    if measure is None:
+        return "–"
     digits = 3 if name in SHARES else 2
     low, high = measure["ci95"]
     return f"{measure['mean']:.{digits}f} [{low:.{digits}f}, {high:.{digits}f}]"

@@ -312,6 +312,20 @@ def poll(
         time.sleep(every)
 
 
+@app.command(name="prolific-webhook")
+def prolific_webhook(
+    workspace: Annotated[
+        str | None, typer.Option(help="Id of the Prolific workspace, where the account has several.")
+    ] = None,
+) -> None:
+    """Have Prolific tell this server of changes at once, and print the secret that the server needs."""
+    from server.services.recruiters import prolific_webhook as subscribed
+
+    target, secret = subscribed(settings_of_environment(), workspace)
+    typer.echo(f"Prolific tells {target} of changes. Give the server its secret, and start it again:")
+    typer.echo(f"HATLAB_PROLIFIC_WEBHOOK_SECRET={secret}")
+
+
 def lines_of(path: Path) -> list[str]:
     """A text file's lines, whatever system wrote it.
 

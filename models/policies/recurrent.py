@@ -158,12 +158,24 @@ class RecurrentNet(nn.Module):
         """
         encoded = self.encoder(observation)
         hidden1, cell1 = self.first(encoded, (memory.hidden1, memory.cell1))
-        source = torch.cat((hidden1, encoded), 1)
-        raw = self.speech(source)
+        raw = self.speech(torch.cat((hidden1, encoded), 1))
+        after = memory._replace(hidden1=hidden1, cell1=cell1)
+        return self.utter(raw, after, encoded, draws, discrete=discrete)
+
+    def utter(
+        self,
+        raw: Tensor,
+        memory: Memory,
+        encoded: Tensor,
+        draws: Tensor | None = None,
+        *,
+        discrete: bool = True,
+    ) -> Said:
+        """The second half of ``speak``: what the speech layer's vectors (R, D) become, and if it is sent."""
         if self.architecture.channel != "one-hot":
             raw = torch.tanh(raw)
         token, message, loss = self._utter(raw, draws, discrete)
-        logit = self._gate_logit(torch.cat((source, memory.hidden2), 1))
+        logit = self._gate_logit(memory, encoded)
         gate = (
             torch.ones_like(logit)
             if self.gate is None
@@ -171,7 +183,6 @@ class RecurrentNet(nn.Module):
         )
         if self.architecture.channel == "none":
             gate = torch.zeros_like(logit)
-        memory = memory._replace(hidden1=hidden1, cell1=cell1)
         return Said(token, message, gate, logit, memory, encoded, raw, loss)
 
     def _utter(self, raw: Tensor, draws: Tensor | None, discrete: bool) -> tuple[Tensor, Tensor, Tensor]:
@@ -180,9 +191,10 @@ class RecurrentNet(nn.Module):
         token, message, loss = self.channel(raw)
         return token, message if discrete or self.architecture.channel == "none" else raw, loss
 
-    def _gate_logit(self, source: Tensor) -> Tensor:
+    def _gate_logit(self, memory: Memory, encoded: Tensor) -> Tensor:
         if self.gate is None:
-            return source.new_full((source.shape[0],), 20.0)  # open with probability 1 - 2e-9
+            return encoded.new_full((encoded.shape[0],), 20.0)  # open with probability 1 - 2e-9
+        source = torch.cat((memory.hidden1, encoded, memory.hidden2), 1)
         return self.gate(source).squeeze(1)  # type: ignore[no-any-return]
 
     def act(self, memory: Memory, encoded: Tensor, inbox: Tensor) -> Done:

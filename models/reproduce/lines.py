@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from models.reproduce.cells import Cell, Shelf
 from models.reproduce.tables import SLACK, Column, Entry, Row, Table
 from models.training.config import RecipeError
-from models.training.convergence import Criterion, converged
+from models.training.convergence import Criterion, Unreached, converged
 
 NOT_RUN, NO_RECIPE = "not run", "no recipe yet"
 RATE_TOLERANCE = 0.02
@@ -110,17 +110,18 @@ def _at(stored: Any, path: str) -> Any:
     return stored
 
 
-def convergence(line: Line) -> list[int | None]:
+def convergence(line: Line) -> list[int | Unreached]:
     """Environment steps to convergence, seed by seed; from the ancestor on, or from the first weights."""
     criterion = _criterion(line)
     if criterion is None:
         return []
-    found: list[int | None] = []
+    found: list[int | Unreached] = []
     for stored in line.records:
         rows = list(csv.DictReader(stored["curve"]))
-        place = converged(rows, criterion) if rows and criterion.column in rows[0] else None
+        known = bool(rows) and criterion.column in rows[0]
+        place = converged(rows, criterion) if known else Unreached.NEVER
         before = 0 if line.entry.additional else stored["training"]["env_steps_before"]
-        found.append(None if place is None else place.env_steps + before)
+        found.append(place if isinstance(place, Unreached) else place.env_steps + before)
     return found
 
 

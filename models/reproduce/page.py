@@ -5,7 +5,7 @@ from typing import Any
 
 from models.reproduce.lines import RATE_TOLERANCE, Line, Number, Stock, convergence, number
 from models.reproduce.tables import EPOCH_STEPS, SLACK, Column, Entry
-from models.training.convergence import IN_A_ROW
+from models.training.convergence import IN_A_ROW, Unreached
 
 NOTHING = "–"
 MILLION = 1e6
@@ -15,7 +15,8 @@ was measured on {episodes:,} greedy episodes (argmax) that training never saw. *
 Ours is the mean over seeds, in round brackets the range; with one seed, in square brackets the 95 % interval
 over episodes (Wilson for shares of episodes, else bootstrap). *Converged*: environment steps until
 {in_a_row} evaluations in a row hold the criterion, the paper's figure less {slack:g}; under a budget the
-message rate must be within {tolerance:g} of it too. The paper's epochs are {epoch:,} steps each. Steps and
+message rate must be within {tolerance:g} of it too. *{too_short}*: it held to the end of training, but in
+fewer evaluations than that. The paper's epochs are {epoch:,} steps each. Steps and
 CPU-minutes (of one core, measured by the process) in brackets include those of the agents that an agent
 starts from."""
 
@@ -25,7 +26,7 @@ def page(stock: Stock) -> str:
     table = stock.table
     head = HEAD.format(
         name=table.name, episodes=table.episodes, in_a_row=IN_A_ROW, epoch=EPOCH_STEPS,
-        slack=SLACK, tolerance=RATE_TOLERANCE,
+        slack=SLACK, tolerance=RATE_TOLERANCE, too_short=Unreached.TOO_SHORT.capitalize(),
     )  # fmt: skip
     sections = [_section(column, stock.lines(column)) for column in table.column]
     return "\n\n".join([f"# {table.title}", head, table.text.strip(), *sections]) + "\n"
@@ -103,13 +104,17 @@ def _our_steps(line: Line) -> str:
     steps = convergence(line)
     if not line.records or not steps:
         return NOTHING
-    reached = [value for value in steps if value is not None]
+    reached = [value for value in steps if not isinstance(value, Unreached)]
+    short = sum(value is Unreached.TOO_SHORT for value in steps)
+    if short == len(steps):
+        return str(Unreached.TOO_SHORT)
+    unsure = f", {short} of {len(steps)} {Unreached.TOO_SHORT}" if short else ""
     if not reached:
-        return "never"
+        return f"{Unreached.NEVER}{unsure}"
     mean = sum(reached) / len(reached)
     sign = "+" if line.entry.additional else ""
     share = "" if len(reached) == len(steps) else f", {len(reached)} of {len(steps)}"
-    return f"{sign}{mean / MILLION:.2f} M{share}"
+    return f"{sign}{mean / MILLION:.2f} M{share}{unsure}"
 
 
 def _help(records: Iterable[dict[str, Any]]) -> str:

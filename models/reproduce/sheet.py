@@ -44,7 +44,7 @@ def _figures(table: Table, line: Line, shown: Shown) -> list[Any]:
 def _costs(line: Line) -> list[Any]:
     entry, records = line.entry, line.records
     paper = "" if entry.epochs is None else round(entry.epochs * EPOCH_STEPS)
-    steps = " ".join("never" if value is None else str(value) for value in convergence(line))
+    steps = " ".join(str(value).replace(" ", "-") for value in convergence(line))
     keys = ("env_steps", "env_steps_before", "cpu_minutes", "cpu_minutes_before")
     costs = [_mean([stored["training"][key] for stored in records]) for key in keys]
     first = records[0] if records else {"warm_start": "", "supervised_help": ""}

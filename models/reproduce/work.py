@@ -27,7 +27,7 @@ from models.training.trainer import fingerprint
 BOOK = "cell.json"
 """In the run's folder: the weights that it started from."""
 NICE = 10
-CURVE = ("total", "env_steps", "success", "reward", "message_rate")
+CURVE = ("total", "env_steps", "success", "reward", "message_rate", "drawn_rate")
 COSTS = ("env_steps", "cpu_minutes")
 REFUSED = 2
 REFUSALS = (
@@ -165,6 +165,7 @@ def record(shelf: Shelf, cell: Cell, recipe: Recipe) -> dict[str, Any]:
         "training": cost(shelf, cell, recipe, run, rows),
         "views": views(recipe, run.policy, shelf.episodes),
         "meaning": meaning(recipe, run.policy),
+        "drawn_rate": drawn_rate(recipe, rows),
         "curve": curve(rows),
         "content": content,
     }
@@ -188,6 +189,18 @@ def cost(
         steps = bundle.load(shelf.bundles / recipe.init_from).manifest.steps_trained
         before = {"env_steps_before": steps, "cpu_minutes_before": None}  # a bundle does not know
     return own | before
+
+
+def drawn_rate(recipe: Recipe, rows: list[dict[str, str]]) -> float | None:
+    """Share of messages that the kept agent's drawn gates sent in training; None without a budget.
+
+    Beside the greedy rate, which a threshold holds at the budget whatever was learned, it shows an Enforcer
+    that does nothing.
+    """
+    if recipe.phase[-1].budget is None:
+        return None
+    kept = [row.get("drawn_rate") for row in rows if row["best"] == "1"]
+    return float(kept[-1]) if kept and kept[-1] else None
 
 
 def _sum(*parts: float | None) -> float | None:

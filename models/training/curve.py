@@ -40,7 +40,11 @@ SUCCESS = (
     Series("human", "human trials: no collision", ORANGE),
     Series("arrived", "human trials: arrived", SOFT),
 )
-RATE = (Series("message_rate", "message rate", ACCENT), Series("human_rate", "in human trials", ORANGE))
+RATE = (
+    Series("message_rate", "message rate", ACCENT),
+    Series("human_rate", "in human trials", ORANGE),
+    Series("drawn_rate", "drawn in training", SOFT),
+)
 BUDGET = Series("", "budget", INK)
 
 
@@ -80,7 +84,7 @@ def _points(rows: list[log.Row], series: tuple[Series, ...]) -> Points:
         {"env_steps": int(row["env_steps"]), "value": float(row[one.column]), "line": one.name}
         for one in series
         for row in rows
-        if not math.isnan(float(row[one.column] or "nan"))
+        if not math.isnan(float(row.get(one.column) or "nan"))
     ]
 
 

@@ -7,11 +7,13 @@ from pathlib import Path
 FILE = "log.csv"
 COLUMNS = (
     "phase", "update", "total", "env_steps", "seconds", "cpu_s", "lr", "loss", "parts", "entropy", "decoder",
-    "success", "human", "arrived", "steps", "reward", "message_rate", "human_rate", "tokens_used", "score",
-    "best",
+    "drawn_rate", "success", "human", "arrived", "steps", "reward", "message_rate", "human_rate",
+    "tokens_used", "score", "best",
 )  # fmt: skip
 """``total`` counts updates over all phases; ``entropy`` and ``decoder`` are in nats, of the last update, the
-latter empty without a decoder; ``success`` to ``score`` are fields of ``models.training.checks.Checked``."""
+latter empty without a decoder; ``drawn_rate`` is the share of messages that the last update sent, with
+gates drawn as training draws them; ``success`` to ``score`` are fields of
+``models.training.checks.Checked``, with greedy gates."""
 
 Row = dict[str, str]
 
@@ -34,7 +36,7 @@ def size(folder: Path) -> int:
 
 
 def cut(folder: Path, length: int) -> None:
-    """Forget what was logged after the checkpoint; a log with fewer columns (version 0.1) gets all."""
+    """Forget what was logged after the checkpoint; a log with fewer columns (an older version) gets all."""
     with (folder / FILE).open("r+b") as file:
         file.truncate(length)
     rows = read(folder)

@@ -19,7 +19,11 @@ from models.training.trainer import Trainer
 PACKAGED = Path(__file__).parent.parent / "bundles"
 CURVE_EVERY_S = 300.0
 """Least time between two drawings of the curve: each takes half a second, which a run should not feel."""
-READINGS = {"success": "success", "rate": "message_rate", "entropy": "entropy", "decoder": "decoder"}
+READINGS = (
+    {"success": "success", "rate": "message_rate", "drawn": "drawn_rate"},
+    {"entropy": "entropy", "decoder": "decoder"},
+)
+"""Lines of label and reading; *rate* is of greedy gates, *drawn* of those of training."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +113,7 @@ def _follow(trainer: Trainer, progress: bool) -> None:
 def _bar(shown: bool) -> Bar:
     columns = (
         TextColumn("{task.description}"),
-        BarColumn(10),  # two lines of text, bar, count and time fit into 80 columns
+        BarColumn(10),  # three lines of text, bar, count and time fit into 80 columns
         MofNCompleteColumn(),
         TimeRemainingColumn(compact=True),
     )
@@ -119,6 +123,11 @@ def _bar(shown: bool) -> Bar:
 def _status(trainer: Trainer) -> str:
     """Where the run is, and under it what it has reached."""
     phase = "done" if trainer.finished else trainer.phase.name
-    values = {label: getattr(trainer.readings, name) for label, name in READINGS.items()}
-    shown = [f"{label} {'–' if value is None else format(value, '.3f')}" for label, value in values.items()]
-    return f"{trainer.recipe.name}: {phase}\n{'  '.join(shown)}"
+    return "\n".join([f"{trainer.recipe.name}: {phase}", *(_shown(trainer, labels) for labels in READINGS)])
+
+
+def _shown(trainer: Trainer, labels: dict[str, str]) -> str:
+    values = {label: getattr(trainer.readings, name) for label, name in labels.items()}
+    return "  ".join(
+        f"{label} {'–' if value is None else format(value, '.3f')}" for label, value in values.items()
+    )

@@ -54,6 +54,9 @@ class Readings:
 
     success: float | None = None
     message_rate: float | None = None
+    """Of greedy gates, which get a threshold that meets a budget: it says nothing about what was learned."""
+    drawn_rate: float | None = None
+    """Of the last update, of the gates as they were drawn; None if nobody could be heard."""
     score: float | None = None
     entropy: float | None = None
     """Of the actions, in nats."""
@@ -201,7 +204,9 @@ class Trainer:
         self.clock.lap()
 
     def _read(self, seen: Unrolled) -> None:
-        """Entropy and decoder of the update's last window."""
+        """Entropy, decoder and message rate of the update's last window."""
+        sent = seen.gate.detach()[_uttered(seen).to(self.device)]
+        self.readings.drawn_rate = float(sent.mean()) if len(sent) else None
         logits = seen.logits.detach().log_softmax(1)
         self.readings.entropy = float(-(logits.exp() * logits).sum(1).mean())
         weighted = self._losses.get("decoder")
@@ -320,7 +325,7 @@ class Trainer:
         lr = between(phase.lr, phase.lr_end, at, phase)
         row = (phase.name, at.update, at.total, at.steps, f"{self.clock.seconds:.1f}",
                f"{self.clock.cpu_s:.1f}", f"{lr:.2e}", sum(self._losses.values()), parts, now.entropy,
-               now.decoder, *checked, int(better))  # fmt: skip
+               now.decoder, now.drawn_rate, *checked, int(better))  # fmt: skip
         with self._writing():
             log.add(self.folder, row)
 

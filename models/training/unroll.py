@@ -16,12 +16,11 @@ from torch import Tensor
 
 from models.envs.api import Environment
 from models.envs.starts import HumanStart
-from models.policies.recurrent import Memory, RecurrentNet, Said
+from models.policies.recurrent import Done, Memory, RecurrentNet, Said
+from models.training.arithmetic import FORGOTTEN, Arithmetic, Recall, Seen, Spoken, distinct
 
 Bools = NDArray[np.bool_]
 Ints = NDArray[np.int32]
-
-FORGOTTEN = -1  # the row of a seat that remembers nothing
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +92,7 @@ class Mind:
 
     def __init__(self, env: Environment[Any], net: RecurrentNet, batch: int, manner: Manner) -> None:
         self.env, self.net, self.batch, self.manner = env, net, batch, manner
+        self._arithmetic = Arithmetic(net)
         self._rows = blank(net, 1)
         self._row_of = np.zeros(batch * env.agents, np.int64)
         self.device = device_of(net)
@@ -113,32 +113,40 @@ class Mind:
 
     def _recall(self, row: NDArray[np.int64]) -> Memory:
         """The rows of the last step; zeros for -1."""
-        known = row >= 0
-        index = self._place(np.maximum(row, 0))
-        parts = [part.index_select(0, index) for part in self._rows]
-        if not known.all():
-            mask = self._place(known).unsqueeze(1)
-            parts = [part * mask for part in parts]
-        return Memory(*parts)
+        wanted = np.flatnonzero(row >= 0)
+        successor = np.full(len(self._rows.hidden1), FORGOTTEN)
+        successor[row[wanted]] = wanted
+        index = [
+            np.maximum(row, 0),
+            np.flatnonzero(row < 0),
+            np.maximum(successor, 0),
+            np.flatnonzero(successor < 0),
+        ]
+        return Memory(*Recall.apply(*(self._place(each) for each in index), *self._rows))  # type: ignore[no-untyped-call]
 
     def speak(
         self, state: Any, living: Bools, generator: torch.Generator | None
-    ) -> tuple[NDArray[np.int64], Said]:
+    ) -> tuple[NDArray[np.int64], Spoken]:
         """The living seats (B, N) speak; returns their places (R,) and what they said."""
         place = np.flatnonzero(living)
         row = np.where(self.env.fresh(state).reshape(-1)[place], FORGOTTEN, self._row_of[place])
         observation = self.env.observe(state).reshape(-1, self.env.observation_size)[place]
+        first, which = distinct(observation)
         draws = None if generator is None else torch.rand(len(place), 2, generator=generator).to(self.device)
-        said = self.net.speak(
+        said, own = self._arithmetic.speak(
             self._recall(row),
-            self._place(observation),
+            Seen(self._place(observation[first]), self._place(which)),
             draws,
             discrete=self.manner.discrete,
         )
         gate = torch.ones_like(said.gate) if self.manner.open_gate else said.gate
         if self.net.architecture.channel == "none":
             gate = torch.zeros_like(gate)
-        return place, said._replace(gate=gate * self._speaks[self._place(place)])
+        return place, Spoken(said._replace(gate=gate * self._speaks[self._place(place)]), own)
+
+    def act(self, spoken: Spoken, inbox: Tensor) -> Done:
+        """They act on what they heard."""
+        return self._arithmetic.act(spoken, inbox)
 
     def inbox(self, place: NDArray[np.int64], said: Said) -> Tensor:
         """(R, D): mean of what each living seat receives."""
@@ -234,9 +242,10 @@ class _Rows(NamedTuple):
 def _step(
     mind: Mind, state: Any, living: Bools, generator: torch.Generator, step: int, override: Override | None
 ) -> tuple[Ints, _Rows]:
-    place, said = mind.speak(state, living, generator if mind.manner.sampled else None)
+    place, spoken = mind.speak(state, living, generator if mind.manner.sampled else None)
+    said = spoken.said
     inbox = mind.inbox(place, said)
-    done = mind.net.act(said.memory, said.encoded, inbox)
+    done = mind.act(spoken, inbox)
     mind.keep(place, done.memory)
     action = _choose(done.logits, mind.manner, generator)
     actions = np.zeros(living.size, np.int32)
@@ -312,10 +321,10 @@ def warmed_up(
     memory = blank(net, batch * env.agents)
     for step, (state, _) in enumerate(begun.warmup):
         mind.remember(memory)
-        place, said = mind.speak(
+        place, spoken = mind.speak(
             state, env.alive(state) & begun.active(step)[:, None], generator if manner.sampled else None
         )
-        done = net.act(said.memory, said.encoded, mind.inbox(place, said))
+        done = mind.act(spoken, mind.inbox(place, spoken.said))
         for kept, after in zip(memory, done.memory, strict=True):
             kept[torch.from_numpy(place).to(kept.device)] = after
     return memory

@@ -17,7 +17,7 @@ REGION = "us-east-1"  # MTurk has no other
 PAGE = 100  # the most that one answer lists
 ATTEMPTS = 5
 CONNECT_S, READ_S = 5, 30
-MISSING = "MTurk needs boto3, an optional part of hatlab: pip install 'hatlab[mturk]'"
+MISSING = "MTurk needs boto3. In hatlab's folder: .venv/bin/pip install -c constraints.txt -e '.[mturk]'"
 KEYS_WRONG = (
     "MTurk does not accept the access key: check HATLAB_MTURK_ACCESS_KEY_ID, HATLAB_MTURK_SECRET_ACCESS_KEY, "
     "HATLAB_MTURK_ENDPOINT and this computer's clock"

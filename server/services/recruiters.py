@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import TYPE_CHECKING
 
-from server.domain.errors import NotReadyError
+from server.domain.errors import BadInputError, NotReadyError
 from server.domain.money import reward_minor
 from server.domain.reconciliation import Site
 from server.domain.study import Pay, StudyDefinition
@@ -86,3 +86,28 @@ def mturk(lab: Lab) -> "MTurkRecruiter":
             return postings.external_id_of_submission(db, "mturk", submission_id)
 
     return MTurkRecruiter(client, settings.mturk_endpoint, worker_of)
+
+
+def prolific_webhook(settings: Settings, workspace: str | None) -> tuple[str, str]:
+    """Have Prolific tell this server of changes; the address that it tells, and the secret it signs with.
+
+    Raises:
+        NotReadyError: no account is set up, or Prolific refused.
+        BadInputError: there are several workspaces and none, or none of them, was named.
+    """
+    from server.recruitment.prolific_http import Connection
+    from server.recruitment.prolific_webhook import subscribe, workspaces
+
+    if settings.prolific_token is None:
+        raise NotReadyError(f"no account at {NAMES['prolific']}: see docs/settings.md")
+    target = f"{settings.public_url}/hooks/prolific"
+    with closing(Connection(settings.prolific_api, settings.prolific_token)) as connection:
+        try:
+            known = workspaces(connection)
+            if workspace not in known and (workspace is not None or len(known) != 1):
+                listed = ", ".join(f"{key} ({title})" for key, title in known.items()) or "none"
+                raise BadInputError(f"name one workspace of the account with --workspace: {listed}")
+            made = subscribe(connection, workspace or next(iter(known)), target)
+        except RecruiterError as error:
+            raise NotReadyError(str(error)) from error
+    return target, made.secret.get_secret_value()

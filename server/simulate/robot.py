@@ -128,6 +128,9 @@ class Robot:
             after = view["round"]
 
     async def _play_round(self, step_url: str, view: View) -> View:
+        """Play a round to its end; after a form the server shows the round before it, which is over."""
+        if view["over"] is not None:
+            return view
         while view["over"] is None:
             await self.pace()
             view = await self._step(step_url, view)

@@ -111,7 +111,7 @@ def bundles_played(db: DbSession, participants: Sequence[str]) -> dict[str, set[
         .distinct()
     )
     found: dict[str, set[str]] = {}
-    for who, sha256 in db.read(statement):
+    for who, sha256 in cast("Iterator[tuple[str, str]]", db.read(statement)):
         found.setdefault(who, set()).add(sha256)
     return found
 

@@ -21,7 +21,7 @@ from server.web import journey_map
 ROOT = Path(__file__).parents[2]
 PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 IMAGES = sorted((ROOT / "docs" / "images").glob("*"))
-IMAGE_BYTES_MAX = 200_000
+IMAGE_BYTES_MAX = 140_000
 NUMBER = re.compile(
     r"[<≤>≥≈~+−-]?[\d,]*\.?\d+( ?\[[^]]*\])?"
     r"( ?(%|ms|s|min|h|kB|MB|GB|Hz|px|cells|/s|rows/s|actions/s|steps/s))?"

@@ -2,21 +2,18 @@
 // `make screenshots`: the pictures of README and docs, taken from a real server that is played in real Chromium.
 // `node tests/e2e/screenshots.mjs <folder>`; HATLAB names the command (default .venv/bin/hatlab).
 
-import { execFile, spawn } from "node:child_process";
 import { randomBytes } from "node:crypto";
-import { mkdirSync, mkdtempSync, rmSync } from "node:fs";
-import { tmpdir } from "node:os";
+import { mkdirSync, rmSync } from "node:fs";
 import { join, resolve } from "node:path";
-import { createInterface } from "node:readline";
-import { promisify } from "node:util";
-import { Participant, passGate, playing, press, result } from "./browser.mjs";
+import { Participant, passGate, playing, result, SIZES } from "./browser.mjs";
+import { ask, launch, offer, SLUG, settle, signIn, take } from "./recruiting.mjs";
+import { served } from "./servers.mjs";
+import { agree, go, onward, readInstructions } from "./visitor.mjs";
 
-/** @import { Page } from "playwright-core" */
+/** @import { Locator, Page } from "playwright-core" */
 
-const HATLAB = resolve(process.env.HATLAB ?? ".venv/bin/hatlab");
 const FOLDER = resolve(process.argv[2] ?? "docs/images");
-const PASSWORD = randomBytes(12).toString("hex");
-const ROBOTS = 4;
+const ROBOTS = 8;
 /** Steps after which the pictures of a round are taken: enough for a path, too few for the end. */
 const STEPS = 4;
 /** Triangles on the picture of the junction, at least; they are looked for in so many rounds. */
@@ -24,103 +21,28 @@ const TRIANGLES = 3;
 const ROUNDS = 6;
 
 /**
- * A migrated database and a server of its own, for as long as `use` runs.
- * @param {(url: string, hatlab: (...words: string[]) => Promise<unknown>) => Promise<void>} use
- */
-async function served(use) {
-  const home = mkdtempSync(join(tmpdir(), "hatlab-pictures-"));
-  const env = {
-    ...process.env,
-    HATLAB_DATABASE_URL: `sqlite:///${join(home, "hatlab.sqlite3")}`,
-    HATLAB_ADMIN_PASSWORD: PASSWORD,
-    OMP_NUM_THREADS: "1",
-  };
-  const hatlab = (/** @type {string[]} */ ...words) => promisify(execFile)(HATLAB, words, { env });
-  await hatlab("init");
-  const server = spawn(HATLAB, ["serve", "--port", "0"], { env, stdio: ["ignore", "pipe", "inherit"] });
-  try {
-    const url = await addressOf(server);
-    await fetch(`${url}/healthz`); // it listens before its agents are loaded: this waits for them
-    await use(url, hatlab);
-  } finally {
-    server.kill();
-    await new Promise((ended) => server.once("exit", ended));
-    rmSync(home, { recursive: true, force: true });
-  }
-}
-
-/** @param {import("node:child_process").ChildProcessByStdio<null, import("node:stream").Readable, null>} server */
-async function addressOf(server) {
-  for await (const line of createInterface(server.stdout)) {
-    const found = /listens on (\S+)/.exec(line);
-    if (found?.[1]) return found[1];
-  }
-  throw new Error("the server ended before it listened");
-}
-
-/**
- * @param {Page} page
+ * @param {Page | Locator} what a page's window, or a part of it
  * @param {string} name
+ * @param {{ x: number, y: number, width: number, height: number }} [clip]
  */
-async function picture(page, name) {
-  await page.screenshot({ path: join(FOLDER, `${name}.png`) });
+async function picture(what, name, clip) {
+  await what.screenshot({ path: join(FOLDER, `${name}.png`), ...(clip && { clip }) });
   console.log(join(FOLDER, `${name}.png`));
 }
 
 /**
- * The link of somebody new.
+ * Somebody new comes to a study and agrees.
+ * @param {Page} page
  * @param {string} url
  * @param {string} study
  */
-function invitation(url, study) {
-  return `${url}/s/${study}?PROLIFIC_PID=${randomBytes(12).toString("hex")}&STUDY_ID=pictures&SESSION_ID=1`;
-}
-
-/**
- * Through consent, as far as the instructions.
- * @param {Page} page
- * @param {string} link
- */
-async function enter(page, link) {
-  await page.goto(link);
-  await passGate(page);
-  await page.locator("[name=read]").check();
-  await page.getByRole("button", { name: "I agree, start" }).click();
-  await page.waitForURL(/\/p\//);
-}
-
-/** Keys that the instructions ask for. @type {Record<string, string[]>} */
-const PROBE = { parent: ["ArrowUp"], child: ["1"], driver: ["f", "j"] };
-
-/** @param {Page} page */
-async function readInstructions(page) {
-  const role = String(await page.locator("#probe").getAttribute("data-role"));
-  for (const key of PROBE[role] ?? []) await page.keyboard.press(key);
-  await page.locator("#received .badge").waitFor();
-  await page.getByRole("button", { name: "Next" }).click();
-  await page.locator(".board-wrap svg").waitFor();
-  return role;
-}
-
-/** @param {Page} page */
-async function onward(page) {
-  await result(page);
-  const before = await page.locator("#far").textContent();
-  await page.keyboard.press("Space");
-  await page.waitForFunction((text) => document.querySelector("#far")?.textContent !== text, before);
+async function enter(page, url, study) {
+  const person = randomBytes(12).toString("hex");
+  await page.goto(`${url}/s/${study}?PROLIFIC_PID=${person}&STUDY_ID=pictures&SESSION_ID=${person}`);
+  await agree(page);
 }
 
 const TOUR = ["ArrowUp", "ArrowUp", "ArrowRight", "ArrowRight", "ArrowDown", "ArrowLeft"];
-
-/**
- * A walk until the round is over, or for so many steps.
- * @param {Page} page
- * @param {string[]} keys
- * @param {number} [most]
- */
-async function go(page, keys, most = Number.POSITIVE_INFINITY) {
-  for (let i = 0; i < most && (await playing(page)); i += 1) await press(page, keys[i % keys.length] ?? "");
-}
 
 /** @param {Page} page */
 async function asParent(page) {
@@ -154,7 +76,7 @@ async function asChild(page) {
  */
 async function bothRoles(page, url) {
   for (const seen = new Set(); seen.size < 2; ) {
-    await enter(page, invitation(url, "parent-child"));
+    await enter(page, url, "parent-child");
     const role = await readInstructions(page);
     if (!seen.has(role)) await (role === "parent" ? asParent(page) : asChild(page));
     seen.add(role);
@@ -179,31 +101,48 @@ async function drive(page) {
  * @param {string} url
  */
 async function admin(page, url) {
-  await page.goto(`${url}/admin`);
-  await page.locator("[name=username]").fill("admin");
-  await page.locator("[name=password]").fill(PASSWORD);
-  await page.keyboard.press("Enter");
-  await page.getByRole("heading", { name: "Studies" }).waitFor();
-  for (const [name, path] of [
-    ["admin-build", "/admin/studies/traffic-junction"],
-    ["admin-monitor", "/admin/studies/traffic-junction/monitor?mode=robot&show=finished"],
-    ["admin-agents", "/admin/agents"],
-  ]) {
-    await page.goto(`${url}${path}`);
-    await picture(page, String(name));
-  }
+  await page.goto(`${url}/admin/studies/traffic-junction`);
+  await picture(page, "admin-build");
+  await page.goto(`${url}/admin/agents`);
+  await picture(page, "admin-agents");
+  await page.goto(`${url}/admin/studies/traffic-junction/monitor?mode=robot&show=finished`);
+  await picture(page, "admin-monitor");
+}
+
+/**
+ * What docs/first-study.md tells, as far as the pictures of it.
+ * @param {Page} page
+ * @param {import("./servers.mjs").Served} served
+ */
+async function recruiting(page, { url, market }) {
+  await launch(page, url);
+  await offer(page, url);
+  await take(page, market);
+  await page.goto(market);
+  await picture(page, "fake-prolific");
+  await ask(page, url);
+  await picture(page.locator(".posting"), "admin-recruitment");
+  await page.goto(`${url}/admin/studies/${SLUG}/monitor?mode=test&show=all`);
+  await picture(page.locator("section", { has: page.getByRole("heading", { name: "Flow of people" }) }), "admin-flow");
+  await ask(page, url);
+  await settle(page);
 }
 
 mkdirSync(FOLDER, { recursive: true });
-await served(async (url, hatlab) => {
+await served(async (served) => {
+  const { url, password, hatlab } = served;
   await hatlab("simulate", "traffic-junction", "--participants", String(ROBOTS), "--seed", "1", "--url", url);
   const artefacts = join(FOLDER, "failed");
   await Participant.with("pictures", artefacts, async (who) => {
     const page = await who.tab();
+    await signIn(page, url, password);
+    await recruiting(page, served);
+    await page.setViewportSize(SIZES.small);
     await page.goto(`${url}/s/parent-child`);
     await passGate(page);
-    await picture(page, "consent");
-    await enter(page, invitation(url, "traffic-junction"));
+    await picture(page, "consent", { x: 0, y: 0, ...SIZES.small, height: 500 });
+    await page.setViewportSize(SIZES.large);
+    await enter(page, url, "traffic-junction");
     await picture(page, "instructions");
     await drive(page);
     await bothRoles(page, url);

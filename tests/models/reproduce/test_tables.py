@@ -2,17 +2,20 @@
 
 import csv
 import shutil
+import tomllib
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner, Result
 
+from models.card import supervised_help
 from models.cli import app
-from models.reproduce import tables
+from models.reproduce import page, tables
 from models.reproduce.cells import Cell
 from models.reproduce.lines import Line, convergence, number
-from models.reproduce.work import Job, do
-from tests.models.reproduce.tiny import TABLE, laid_out
+from models.reproduce.work import Job, do, drawn_rate
+from models.training import config
+from tests.models.reproduce.tiny import PLAIN, TABLE, laid_out
 
 
 def reproduce(folder: Path, *words: str) -> Result:
@@ -122,7 +125,15 @@ def test_table_1_asks_for_every_method_on_four_tasks() -> None:
     recipes = {cell.recipe for cell in tables.load("table1").cells()}
     methods = ["none", "fixed-cts", "fixed-proto", "gated-cts", "gated-proto", "onehot"]
     methods += [f"enforcer-{b}" for b in ("090", "070", "050", "030", "020", "010")]
-    assert recipes == {f"{task}-{m}" for task in ("easy", "medium", "prey5", "prey10") for m in methods}
+    every = {f"{task}-{m}" for task in ("easy", "medium", "prey5", "prey10") for m in methods}
+    assert recipes == every | {"easy-reinforce-only"}
+
+
+def test_the_reward_is_the_only_help_of_the_row_that_says_so() -> None:
+    (cell,) = tables.load("table1").cells("easy-reinforce-only", seeds=(1,))
+    recipe = config.load(tables.PACKAGED.parent / "recipes" / f"{cell.recipe}.toml")
+    assert (recipe.warm_start, recipe.init_from) == (None, None)
+    assert supervised_help(recipe.model_dump(mode="json")) == "none"
 
 
 def test_a_budget_counts_from_where_it_starts_and_only_if_it_is_kept() -> None:
@@ -136,8 +147,34 @@ def test_a_budget_counts_from_where_it_starts_and_only_if_it_is_kept() -> None:
     line = Line("Enforcer-.3", column, entry, "", [1], 1, [stored])
     assert convergence(line) == [5000]
     assert convergence(line._replace(entry=entry.model_copy(update={"additional": False}))) == [1_005_000]
-    never = stored | {"curve": curve[:20]}
-    assert convergence(line._replace(records=[never])) == [None]
+    early = stored | {"curve": curve[:20]}
+    never = stored | {"curve": curve[:5]}
+    seeds = line._replace(records=[stored, early, never])
+    assert convergence(seeds) == [5000, "too short to tell", "never"]
+
+
+@pytest.mark.parametrize(
+    ("lengths", "shown"),
+    [
+        ([30], "0.02 M"),
+        ([30, 8], "0.02 M, 1 of 2"),
+        ([30, 8, 20], "0.02 M, 1 of 3, 1 of 3 too short to tell"),
+        ([8, 8], "never"),
+        ([20, 19], "too short to tell"),
+        ([8, 20], "never, 1 of 2 too short to tell"),
+    ],
+)
+def test_a_run_that_ended_while_it_was_good_is_not_said_to_have_never_converged(
+    lengths: list[int], shown: str
+) -> None:
+    """The criterion is met from the tenth evaluation on; runs differ in length."""
+    column = tables.load("table1").column[0]
+    entry = tables.Entry(recipe="x", paper={"views.greedy.success": 0.98})
+    curve = ["total,env_steps,success", *(f"{n},{n}000,{0.5 if n < 10 else 0.98}" for n in range(30))]
+    shape = {"content": {"budget": 1.0}, "training": {"env_steps_before": 10_000}}
+    records = [shape | {"curve": curve[: 1 + length]} for length in lengths]
+    line = Line("", column, entry, "", list(range(len(records))), len(records), records)
+    assert page._our_steps(line) == shown
 
 
 def test_several_seeds_give_mean_and_range_and_one_its_interval() -> None:
@@ -146,3 +183,25 @@ def test_several_seeds_give_mean_and_range_and_one_its_interval() -> None:
     assert number(stored[:1], "a") == (0.2, pytest.approx(0.1), pytest.approx(0.3), "95 % over episodes")
     assert number([{"a": 9}], "a") == (9.0, None, None, "")
     assert number(stored, "b") is None
+
+
+def test_the_drawn_rate_of_a_cell_is_that_of_the_kept_agent_and_only_under_a_budget() -> None:
+    rows = [{"best": best, "drawn_rate": rate} for best, rate in (("1", "0.9"), ("1", "0.41"), ("0", "0.3"))]
+    free, held = (config.parse(tomllib.loads(text)) for text in (PLAIN, PLAIN + "budget = 0.3\n"))
+    assert drawn_rate(held, rows) == 0.41
+    assert drawn_rate(free, rows) is None
+    assert drawn_rate(held, [{"best": "1"}]) is None  # a log of a version that did not write it
+
+
+@pytest.mark.parametrize("name", ["table1", "table2"])
+def test_the_drawn_rate_stands_beside_the_greedy_one_and_is_a_dash_where_a_cell_lacks_it(name: str) -> None:
+    column = tables.load(name).column[0]
+    entry = tables.Entry(recipe="x")
+    stored = {"training": {"env_steps": 0, "env_steps_before": 0, "cpu_minutes": 0, "cpu_minutes_before": 0},
+              "warm_start": None, "supervised_help": "none", "curve": []}  # fmt: skip
+    with_it = Line("new", column, entry, "", [1], 1, [stored | {"drawn_rate": 0.731}])
+    without = Line("old", column, entry, "", [1], 1, [stored])
+    head, _, *lines = page._section(column, [with_it, without]).splitlines()[2:]
+    place = rows(head)["method"].index("drawn rate")
+    found = rows("\n".join(lines))
+    assert (found["new"][place], found["old"][place]) == ("0.731", "–")

@@ -2,7 +2,7 @@
 
 import pytest
 
-from models.training.convergence import Converged, Criterion, converged
+from models.training.convergence import Converged, Criterion, Unreached, converged
 
 
 def rows(marks, **more):
@@ -21,9 +21,14 @@ def test_it_is_where_the_first_long_enough_series_begins():
     assert converged(rows(marks), Criterion(0.95)) == Converged(50 * 23, 2000 * 23)
 
 
-@pytest.mark.parametrize("marks", [[], [GOOD] * 19, [*[GOOD] * 19, BAD] * 3, ["nan"] * 40, [""] * 40])
-def test_a_shorter_series_is_none(marks):
-    assert converged(rows(marks), Criterion(0.95)) is None
+@pytest.mark.parametrize("marks", [[], [*[GOOD] * 19, BAD] * 3, ["nan"] * 40, [""] * 40, [GOOD, BAD]])
+def test_a_shorter_series_that_broke_off_is_never(marks):
+    assert converged(rows(marks), Criterion(0.95)) is Unreached.NEVER
+
+
+@pytest.mark.parametrize("marks", [[GOOD], [GOOD] * 19, [BAD] * 40 + [GOOD] * 19, [GOOD] * 19 + [BAD, GOOD]])
+def test_a_shorter_series_that_held_to_the_end_is_too_short_to_tell(marks):
+    assert converged(rows(marks), Criterion(0.95)) is Unreached.TOO_SHORT
 
 
 def test_exactly_twenty_are_enough():
@@ -35,10 +40,11 @@ def test_exactly_twenty_are_enough():
 )
 def test_the_message_rate_must_keep_to_the_budget_from_both_sides(rate, reached):
     log = rows([GOOD] * 20, message_rate=rate)
-    assert (converged(log, Criterion(0.95, rate=0.5, tolerance=0.02)) is not None) == reached
+    found = converged(log, Criterion(0.95, rate=0.5, tolerance=0.02))
+    assert found == (Converged(50, 2000) if reached else Unreached.NEVER)
 
 
 def test_any_column_can_be_the_measure():
     log = rows([BAD] * 20, reward="2.41")
     assert converged(log, Criterion(2.4, column="reward")) == Converged(50, 2000)
-    assert converged(log, Criterion(2.42, column="reward")) is None
+    assert converged(log, Criterion(2.42, column="reward")) is Unreached.NEVER

@@ -146,7 +146,7 @@ def test_a_log_of_the_first_version_gets_the_new_columns(recipe, tmp_path, whole
     trainer.open(resume=False)
     for _ in range(3):
         trainer.advance()
-    new = {"cpu_s", "entropy", "decoder", "reward"}
+    new = {"cpu_s", "entropy", "decoder", "reward", "drawn_rate"}
     old = [[row[key] for key in row if key not in new] for row in log.read(tmp_path / "run")]
     head = [column for column in log.COLUMNS if column not in new]
     text = "".join(",".join(row) + "\r\n" for row in [head, *old])

@@ -435,7 +435,7 @@ def test_without_boto3_one_line_says_what_to_install(monkeypatch: pytest.MonkeyP
         return real(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(RecruiterError, match=r"hatlab\[mturk\]"):
+    with pytest.raises(RecruiterError, match=r"pip install .*\[mturk\]"):
         MTurkClient("http://127.0.0.1:9", SecretStr("a"), SecretStr("b"))
 
 

@@ -272,3 +272,15 @@ def test_memory_does_not_grow_with_the_number_of_people(
     few = peak_bytes()
     synthetic.fill(lab, "signs", 24, first=6)
     assert peak_bytes() < few * 1.25
+
+
+def test_a_study_of_a_hundred_and_sixty_people_is_exported_whole(
+    sqlite_database: Database, tmp_path: Path
+) -> None:
+    lab = prepared(sqlite_database)
+    synthetic.fill(lab, "cars", 160)
+    found = exported(lab, "cars", tmp_path / "out")
+    people = {row["participant"] for row in found["participants"]}
+    assert len(found["participants"]) == len(people) == 160
+    assert {row["participant"] for row in found["trials"]} == people
+    assert len(found["trials"]) == 160 * 3

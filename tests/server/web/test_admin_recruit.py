@@ -131,3 +131,20 @@ def test_nobody_without_login_reaches_recruitment(site: Lab) -> None:
     stranger = Experimenter(site)
     assert stranger.get(URL).status_code == 303
     assert stranger.client.post(f"{URL}/1/confirm", data={"do.approve:x": "1"}).status_code in {303, 403}
+
+
+def test_opening_the_page_of_differences_pays_nobody_and_rejects_nobody(
+    site: Lab, person: Experimenter, fake: str
+) -> None:
+    row = publish(site, person)
+    people = FakePeople(fake)
+    stranger = people.take(row.external_id)
+    people.hand_in(stranger, "A-GUESS")
+    person.post(f"{URL}/{row.id}/poll")
+    for _ in range(3):
+        assert "handed in there, but never started here" in person.get(URL).text
+    assert people.ledger()["payments"] == []
+    with site.database.reading() as db:
+        assert postings.ledger(db, row.study_id) == []
+        assert [each.state for each in postings.submissions(db, row.id)] == ["awaiting_review"]
+    people.close()

@@ -193,3 +193,33 @@ def test_the_entry_page_asks_and_whoever_declines_or_does_not_fit_reads_what_to_
 
 def test_no_state_is_left_out_here() -> None:
     assert set(NEXT) == {*STAGES, *ENDS} - {State.DECLINED}
+
+
+def test_whoever_was_rejected_there_reloads_in_vain_by_every_address(lab: Lab) -> None:
+    key = into(lab, State.REJECTED)
+    client, before = client_of(lab), person(lab, key)
+    for _ in range(3):
+        assert heading(client.get(f"/p/{key}").text) == HEADINGS[State.REJECTED]
+    back = client.get(f"/s/{SLUG}", params=prolific("ada"))
+    assert back.headers["location"] == f"/p/{key}"
+    assert client.post(f"/p/{key}/round", json={"after": None}).json() == {"page": f"/p/{key}"}
+    assert person(lab, key).status == before.status == "rejected"
+    assert person(lab, key).completion_code is None
+
+
+CODES = {
+    State.FINISHED: "FOUND-CHILD",
+    State.FAILED: "FOUND-CHILD-2",
+    State.SCREENED_OUT: "LOOKED-IN",
+    State.WITHDRAWN: "LEFT-EARLY",
+}
+
+
+@pytest.mark.parametrize("state", CODES)
+def test_each_end_has_a_code_of_its_own_to_read_and_a_link_that_carries_it(lab: Lab, state: State) -> None:
+    text = client_of(lab).get(f"/p/{into(lab, state)}").text
+    assert f"{CODES[state]}</output>" in text
+    assert f'href="https://app.prolific.com/submissions/complete?cc={CODES[state]}"' in text
+    assert not any(
+        f">{code}<" in text or f'={code}"' in text for code in set(CODES.values()) - {CODES[state]}
+    )
