@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from sqlalchemy import insert, select
+from sqlalchemy import func, insert, select
 
 from server.storage.database import DbSession
 from server.storage.tables import browser_event
@@ -34,6 +34,11 @@ def add(db: DbSession, rows: Sequence[BrowserEventRow]) -> int:
     if fresh:
         db.write(insert(browser_event), fresh)
     return len(fresh)
+
+
+def count(db: DbSession, participant_id: str) -> int:
+    statement = select(func.count()).where(browser_event.c.participant_id == participant_id)
+    return int(db.read(statement).scalar_one())
 
 
 def of_participant(db: DbSession, participant_id: str) -> list[BrowserEventRow]:

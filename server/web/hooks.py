@@ -9,6 +9,7 @@ from starlette.responses import Response
 
 from server.recruitment import prolific_webhook
 from server.recruitment.prolific_webhook import WebhookError
+from server.recruitment.recruiter import RecruiterError
 from server.services import recruit
 from server.web.dependencies import CurrentLab
 from server.web.errors import problem
@@ -29,6 +30,9 @@ async def prolific(request: Request, lab: CurrentLab) -> Response:
     except WebhookError as error:
         log.warning("webhook refused", reason=str(error))
         return problem(403, "Not believed", str(error))
+    except RecruiterError as error:  # genuine, but of a state that we do not know: asking will say so too
+        log.warning("webhook not understood", reason=str(error))
+        return problem(422, "Not understood", str(error))
     if change is not None:
         await run_in_threadpool(recruit.take_change, lab, "prolific", change)
     return Response(status_code=200)

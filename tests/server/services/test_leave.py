@@ -140,3 +140,15 @@ def test_who_was_erased_meanwhile_has_no_session_any_more(lab: Lab) -> None:
         leave.withdraw(db, lab, under_way, keep=False)
     with pytest.raises(NotFoundError), lab.database.writing() as db:
         watch.keep(db, lab, under_way, "visit-0004", "play:1", [(0, "blur", "", 1.0)])
+
+
+def test_a_browser_that_makes_up_visits_fills_no_disk(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watch, "MOST_A_PERSON", 3)
+    key = entered(lab, SLUG)
+    stored = []
+    for visit in range(3):
+        with lab.database.writing() as db:
+            who = enrol.participant_by_key(db, lab, key)
+            told = [(seq, "blur", "", 1.0) for seq in range(2)]
+            stored.append(watch.keep(db, lab, who, f"visit-000{visit}", "play:1", told))
+    assert stored == [2, 1, 0]

@@ -94,3 +94,11 @@ def test_a_changed_body_under_a_good_signature_is_refused(lab: Lab, client: Clie
 def test_without_a_secret_nothing_is_believed(sqlite_database: Database) -> None:
     client = client_of(fake_lab(sqlite_database))
     assert client.post("/hooks/prolific", **message("RETURNED")).status_code == 404
+
+
+def test_a_state_that_nobody_knows_is_said_and_is_no_fault_of_the_servers(lab: Lab, client: Client) -> None:
+    address = come_in(client, SLUG)
+    answer = client.post("/hooks/prolific", **message("ABDUCTED"))
+    assert answer.status_code == 422
+    assert "does not know" in answer.json()["detail"]
+    assert status_of(lab, address) == "active"
