@@ -12,7 +12,7 @@ from server.domain import canonical
 from server.domain.errors import BadInputError, HatlabError, NotFoundError
 from server.domain.participation import Event
 from server.domain.study import StudyDefinition
-from server.recruitment.recruiter import Change, Posted, Posting, RecruiterError, Submission
+from server.recruitment.recruiter import Change, Posted, Posting, Recruiter, RecruiterError, Submission
 from server.services import journey
 from server.services.lab import Lab
 from server.services.recruiters import recruiter
@@ -154,19 +154,36 @@ def keep(lab: Lab, posting_id: int, posted: Posted) -> None:
 
 
 def poll(lab: Lab, posting_id: int) -> int:
-    """Ask for everything and take it in; how many submissions there are."""
+    """Ask for everything and take it in; how many submissions there are.
+
+    Raises:
+        MarketplaceError: it could not be asked; or everything was taken in, and it refused to keep somebody
+            who is new from coming twice.
+    """
     place = opened(lab, posting_id)
     with recruiter(lab, place.row.marketplace, place.study) as there:
         posted = asked(lambda: there.posted(place.row.external_id))
         found = asked(lambda: there.submissions(place.row.external_id))
-        for each in newcomers(lab, posting_id, found):
-            asked(partial(there.remember, place.row.external_id, each.external_id))
-    with lab.database.writing() as db:
-        postings.hold(db, posting_id)
-        postings.told(db, posting_id, posted.state, posted.places)
-        take_in(db, lab, place, found, "poll")
-        postings.polled(db, posting_id, lab.now_utc())
+        new = newcomers(lab, posting_id, found)
+        with lab.database.writing() as db:
+            postings.hold(db, posting_id)
+            postings.told(db, posting_id, posted.state, posted.places)
+            take_in(db, lab, place, found, "poll")
+            postings.polled(db, posting_id, lab.now_utc())
+        remember_all(there, place, new)
     return len(found)
+
+
+def remember_all(there: Recruiter, place: Place, new: Sequence[Submission]) -> None:
+    """Have the marketplace keep each of them from coming twice; one refusal stops none of the others."""
+    refusals = []
+    for each in new:
+        try:
+            asked(partial(there.remember, place.row.external_id, each.external_id))
+        except MarketplaceError as refusal:
+            refusals.append(refusal)
+    if refusals:
+        raise refusals[0]
 
 
 def newcomers(lab: Lab, posting_id: int, told: Sequence[Submission]) -> list[Submission]:

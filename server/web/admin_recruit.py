@@ -1,11 +1,13 @@
 """Admin: recruiting at a marketplace, and the reconciler: every mismatch, done only when confirmed."""
 
 from collections.abc import Callable, Mapping
+from typing import Annotated
 
 from fastapi import APIRouter, Depends
+from fastapi import Path as PathParameter
 from starlette.responses import Response
 
-from server.domain.errors import BadInputError, HatlabError
+from server.domain.errors import BadInputError, HatlabError, NotFoundError
 from server.domain.money import shown
 from server.domain.reconciliation import Mismatch
 from server.services import reconcile, recruit, studies
@@ -41,6 +43,24 @@ ACTIONS = {
     "look": "Look into it",
 }
 LINK = "/admin/studies/{slug}/recruitment"
+MOST = 2**31 - 1  # a database's integer
+
+
+def posting_of_study(
+    lab: CurrentLab, slug: str, posting: Annotated[int, PathParameter(ge=1, le=MOST)]
+) -> int:
+    """The posting that an address names, if the study of the same address has it.
+
+    Raises:
+        NotFoundError: it has none of this number.
+    """
+    with lab.database.reading() as db:
+        if recruit.place_of(db, lab, posting).slug != slug:
+            raise NotFoundError("this study has no such posting")
+    return posting
+
+
+PostingId = Annotated[int, Depends(posting_of_study)]
 
 
 @router.get(LINK)
@@ -151,7 +171,7 @@ def create(lab: CurrentLab, visitor: CurrentVisitor, slug: str, fields: CheckedF
 
 
 @router.get(LINK + "/{posting}/publish")
-def ask_to_publish(lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: int) -> Response:
+def ask_to_publish(lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: PostingId) -> Response:
     with lab.database.reading() as db:
         place, study = recruit.place_of(db, lab, posting), studies.find(db, slug)
         pay = place.study.pay
@@ -176,19 +196,21 @@ def ask_to_publish(lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting:
 
 @router.post(LINK + "/{posting}/publish")
 def publish(
-    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: int, fields: CheckedForm
+    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: PostingId, fields: CheckedForm
 ) -> Response:
     return steered(lab, visitor, slug, lambda: recruit.publish(lab, posting), fields)
 
 
 @router.post(LINK + "/{posting}/pause")
-def pause(lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: int, fields: CheckedForm) -> Response:
+def pause(
+    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: PostingId, fields: CheckedForm
+) -> Response:
     return steered(lab, visitor, slug, lambda: recruit.pause(lab, posting), fields)
 
 
 @router.post(LINK + "/{posting}/places")
 def set_places(
-    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: int, fields: CheckedForm
+    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: PostingId, fields: CheckedForm
 ) -> Response:
     text = fields.get("places", "")
     number = int(text) if text.isascii() and text.isdecimal() and len(text) < 7 else 0
@@ -196,7 +218,9 @@ def set_places(
 
 
 @router.post(LINK + "/{posting}/poll")
-def poll(lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: int, fields: CheckedForm) -> Response:
+def poll(
+    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: PostingId, fields: CheckedForm
+) -> Response:
     """Ask the marketplace how everything stands."""
     return steered(lab, visitor, slug, lambda: recruit.poll(lab, posting), fields)
 
@@ -213,7 +237,7 @@ def steered(
 
 @router.post(LINK + "/{posting}/review")
 def review(
-    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: int, fields: CheckedForm
+    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: PostingId, fields: CheckedForm
 ) -> Response:
     """What was chosen, with what it costs; nothing has happened yet."""
     with lab.database.reading() as db:
@@ -255,7 +279,7 @@ def chosen_keys(fields: Mapping[str, str]) -> set[str]:
 
 @router.post(LINK + "/{posting}/confirm")
 def confirm(
-    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: int, fields: CheckedForm
+    lab: CurrentLab, visitor: CurrentVisitor, slug: str, posting: PostingId, fields: CheckedForm
 ) -> Response:
     """Do what was confirmed; pressed twice it happens once."""
     try:

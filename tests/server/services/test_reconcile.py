@@ -11,7 +11,8 @@ from pydantic import SecretStr
 from sqlalchemy import update
 
 from server.domain.errors import BadInputError, NotReadyError
-from server.recruitment.recruiter import Change, Submission
+from server.recruitment.prolific_api import ProlificRecruiter
+from server.recruitment.recruiter import Change, RecruiterError, Submission
 from server.services import enrol, leave, reconcile, recruit
 from server.services.lab import Lab
 from server.services.reconcile import Outcome
@@ -373,3 +374,24 @@ def test_a_second_posting_of_a_study_does_not_miss_the_people_of_the_first(site:
     recruit.poll(site.lab, other)
     with site.lab.database.reading() as db:
         assert reconcile.look(db, site.lab, other).mismatches == ()
+
+
+def test_a_person_whom_the_marketplace_does_not_remember_keeps_nobody_else_from_being_taken_in(
+    site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[str] = []
+
+    def refuses_the_first(_: ProlificRecruiter, __: str, external_id: str) -> None:
+        asked.append(external_id)
+        if len(asked) == 1:
+            raise RecruiterError("not this worker")
+
+    monkeypatch.setattr(ProlificRecruiter, "remember", refuses_the_first)
+    site.finish()
+    site.arrive()
+    with pytest.raises(recruit.MarketplaceError, match="not this worker"):
+        recruit.poll(site.lab, site.posting_id)
+    assert len(asked) == 2
+    with site.lab.database.reading() as db:
+        states = sorted(row.state for row in postings.submissions(db, site.posting_id))
+    assert states == ["active", "awaiting_review"]

@@ -133,6 +133,17 @@ def test_nobody_without_login_reaches_recruitment(site: Lab) -> None:
     assert stranger.client.post(f"{URL}/1/confirm", data={"do.approve:x": "1"}).status_code in {303, 403}
 
 
+def test_a_posting_is_reached_only_by_the_address_of_its_own_study(site: Lab, person: Experimenter) -> None:
+    row = publish(site, person)
+    other = "/admin/studies/parent-child/recruitment"
+    assert person.get(other).status_code == 200
+    assert person.get(f"{URL}/{row.id}/publish").status_code == 200
+    assert person.get(f"{other}/{row.id}/publish").status_code == 404
+    assert person.post(f"{other}/{row.id}/pause").status_code == 404
+    assert posting(site).state == row.state
+    assert 400 <= person.get(f"{URL}/{10**20}/publish").status_code < 500
+
+
 def test_opening_the_page_of_differences_pays_nobody_and_rejects_nobody(
     site: Lab, person: Experimenter, fake: str
 ) -> None:
