@@ -64,9 +64,16 @@ def look(db: DbSession, lab: Lab, posting_id: int) -> Found:
 
 
 def pay_at(place: Place) -> Pay | None:
-    """The study's pay as the marketplace pays it: where it has no parts, a screen-out costs the reward."""
-    pay = place.study.pay
-    if pay is None or SITES[place.row.marketplace].pays_in_parts:
+    """The study's pay as the marketplace pays it.
+
+    The reward is that of the posting, whatever a later version offers; where a marketplace has no parts, a
+    screen-out costs the reward.
+    """
+    if place.study.pay is None:
+        return None
+    offered = canonical.loads(place.row.content).get("reward_minor", place.study.pay.reward_minor)
+    pay = place.study.pay.model_copy(update={"reward_minor": offered})
+    if SITES[place.row.marketplace].pays_in_parts:
         return pay
     return pay.model_copy(update={"screen_out_minor": pay.reward_minor})
 

@@ -68,7 +68,9 @@ def create(lab: Lab, slug: str, marketplace: str, places: int, description: str)
     wanted = posting_of(lab, definition, places, description)
     with recruiter(lab, marketplace, definition) as there:
         posted = asked(lambda: there.create(wanted))
-    content = canonical.dumps({"mode": study.row.mode, "description": description})
+    content = canonical.dumps(
+        {"mode": study.row.mode, "description": description, "reward_minor": wanted.reward_minor}
+    )
     with lab.database.writing() as db:
         if known := postings.by_external_id(db, marketplace, posted.id):
             return known.id

@@ -327,6 +327,16 @@ def withdrawn(site: Site) -> Taken:
     return taken
 
 
+def test_a_later_version_does_not_change_what_approving_costs(site: Site) -> None:
+    site.finish()
+    dearer = definition(SLUG, trials_per_block=1, pay=PAY | {"reward_minor": 350}, codes=CODES)
+    with site.lab.database.writing() as db:
+        study = studies.by_slug(db, SLUG)
+        assert study is not None
+        studies.add_version(db, study.id, dearer.canonical, dearer.sha256, site.lab.now_utc())
+    assert ("approve", PAY["reward_minor"]) in site.proposed()
+
+
 def test_a_later_version_does_not_change_the_partial_pay_that_was_promised(site: Site) -> None:
     withdrawn(site)
     newer(site, partial_minor=90)
