@@ -31,6 +31,11 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: object) -> "LoadScop
     return ByFile(config, log)
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """What takes minutes begins first: at the end one worker would wait for the other."""
+    items.sort(key=lambda item: not item.nodeid.startswith("tests/torture/"))
+
+
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """A skipped browser test is said at the end, where nobody can miss it.
 
