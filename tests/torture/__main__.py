@@ -17,6 +17,7 @@ from tests.torture.recruited import Settled, ordeal_by_marketplace
 from tests.torture.torture import Ordeal, Report, torture
 
 COMMAND = "make torture"
+MODULE = ".venv/bin/python -m tests.torture"
 ORDEALS = (
     Ordeal("sqlite", kills=20, robots=20, trials_per_block=20, steps_between=(10, 200)),
     Ordeal("postgresql", kills=20, robots=20, trials_per_block=20, steps_between=(10, 200)),
@@ -106,7 +107,8 @@ def main(arguments: list[str]) -> int:
         console.print(marketplace_table(report, settled))
         clean.append(is_clean(report, settled))
     if "--record" in arguments:
-        measurements.record(" ".join([COMMAND, *names]), console.export_text())
+        command = " ".join([MODULE, *names]) if names else COMMAND
+        measurements.record(command, console.export_text())
     return int(not all(clean))
 
 
