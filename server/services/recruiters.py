@@ -40,6 +40,11 @@ def is_connected(settings: Settings, marketplace: str) -> bool:
     return marketplace == "mturk" and None not in keys
 
 
+def must_be_connected(settings: Settings, marketplace: str) -> None:
+    if not is_connected(settings, marketplace):
+        raise NotReadyError(f"no account at {NAMES.get(marketplace, marketplace)}: see docs/settings.md")
+
+
 @contextmanager
 def recruiter(lab: Lab, marketplace: str, study: StudyDefinition) -> Iterator["Recruiter"]:
     """A connection for one piece of work.
@@ -47,8 +52,7 @@ def recruiter(lab: Lab, marketplace: str, study: StudyDefinition) -> Iterator["R
     Raises:
         NotReadyError: no account is set up, or the settings of it cannot be used.
     """
-    if not is_connected(lab.settings, marketplace):
-        raise NotReadyError(f"no account at {NAMES.get(marketplace, marketplace)}: see docs/settings.md")
+    must_be_connected(lab.settings, marketplace)
     try:
         opened = mturk(lab) if marketplace == "mturk" else prolific(lab.settings, study)
     except RecruiterError as error:
@@ -98,8 +102,8 @@ def prolific_webhook(settings: Settings, workspace: str | None) -> tuple[str, st
     from server.recruitment.prolific_http import Connection
     from server.recruitment.prolific_webhook import subscribe, workspaces
 
-    if settings.prolific_token is None:
-        raise NotReadyError(f"no account at {NAMES['prolific']}: see docs/settings.md")
+    must_be_connected(settings, "prolific")
+    assert settings.prolific_token is not None
     target = f"{settings.public_url}/hooks/prolific"
     with closing(Connection(settings.prolific_api, settings.prolific_token)) as connection:
         try:

@@ -206,6 +206,22 @@ export async function playing(page) {
 }
 
 /**
+ * Space leaves the finished round.
+ * @param {Page} page
+ * @returns {Promise<boolean>} whether another page came
+ */
+export async function leaveRound(page) {
+  const before = await page.locator("#far").textContent();
+  await page.evaluate(() => Object.assign(window, { here: true }));
+  await page.keyboard.press("Space");
+  await page.waitForFunction(
+    (text) => !("here" in window) || document.querySelector("#far")?.textContent !== text,
+    before,
+  );
+  return page.evaluate(() => !("here" in window));
+}
+
+/**
  * Two frames have passed: what was to be drawn is on screen, and keys are heard again.
  * @param {Page} page
  */

@@ -4,7 +4,7 @@
 
 import assert from "node:assert/strict";
 import { randomBytes } from "node:crypto";
-import { Participant, passGate, playing, result, SIZES } from "./browser.mjs";
+import { leaveRound, Participant, passGate, playing, result, SIZES } from "./browser.mjs";
 
 /** @import { Locator, Page } from "playwright-core" */
 
@@ -129,28 +129,12 @@ async function playRounds(who, page) {
     await page.waitForTimeout(50);
     assert.ok((await roundsLeft(page)) < before || practice, "the bar counts down");
     if (played === 0) await look(who, page, `round-over-${role}`);
-    if (await leaves(page)) return;
+    if (await leaveRound(page)) return;
   }
 }
 
 /** @param {Page} page */
 const roundsLeft = async (page) => Number.parseInt(String(await page.locator("#bar-rounds").textContent()), 10);
-
-/**
- * Space leaves the finished round.
- * @param {Page} page
- * @returns {Promise<boolean>} whether another page came
- */
-async function leaves(page) {
-  const before = await page.locator("#far").textContent();
-  await page.evaluate(() => Object.assign(window, { here: true }));
-  await page.keyboard.press("Space");
-  await page.waitForFunction(
-    (text) => !("here" in window) || document.querySelector("#far")?.textContent !== text,
-    before,
-  );
-  return page.evaluate(() => !("here" in window));
-}
 
 /** What to choose, by words in the question or else by kind: the right answers of journeys.py. @type {[RegExp, number][]} */
 const CHOICES = [

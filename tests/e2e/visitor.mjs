@@ -1,7 +1,7 @@
 // @ts-check
 // What somebody does who knows the paper's two studies: consent, instructions, rounds, and right answers.
 
-import { passGate, playing, press, result } from "./browser.mjs";
+import { leaveRound, passGate, playing, press, result } from "./browser.mjs";
 
 /** @import { Page } from "playwright-core" */
 
@@ -65,13 +65,7 @@ export async function go(page, keys, most = Number.POSITIVE_INFINITY) {
  */
 export async function onward(page) {
   await result(page);
-  const before = await page.locator("#far").textContent();
-  await page.evaluate(() => Object.assign(window, { here: true }));
-  await page.keyboard.press("Space");
-  await page.waitForFunction(
-    (text) => !("here" in window) || document.querySelector("#far")?.textContent !== text,
-    before,
-  );
+  await leaveRound(page);
   await page.locator(".board-wrap svg, #answers, #probe, main.done").first().waitFor();
   while (await page.locator("#answers").count()) await answer(page);
   return (await page.locator(".board-wrap svg").count()) > 0;

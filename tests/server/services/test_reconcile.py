@@ -269,11 +269,7 @@ def test_a_webhook_about_nobody_here_is_left_alone(site: Site) -> None:
 def test_a_later_version_does_not_change_a_bonus_that_was_promised(site: Site) -> None:
     _, key = site.finish()
     promised = won(site, key)
-    richer = definition(SLUG, trials_per_block=1, codes=CODES, pay={**PAY, "bonus_success_minor": 5})
-    with site.lab.database.writing() as db:
-        study = studies.by_slug(db, SLUG)
-        assert study is not None
-        studies.add_version(db, study.id, richer.canonical, richer.sha256, site.lab.now_utc())
+    newer(site, bonus_success_minor=5)
     with site.lab.database.reading() as db:
         (ada,) = reconcile.people(db, site.lab, recruit.place_of(db, site.lab, site.posting_id))
     assert ada.bonus_minor == promised == 10
@@ -329,11 +325,7 @@ def withdrawn(site: Site) -> Taken:
 
 def test_a_later_version_does_not_change_what_approving_costs(site: Site) -> None:
     site.finish()
-    dearer = definition(SLUG, trials_per_block=1, pay=PAY | {"reward_minor": 350}, codes=CODES)
-    with site.lab.database.writing() as db:
-        study = studies.by_slug(db, SLUG)
-        assert study is not None
-        studies.add_version(db, study.id, dearer.canonical, dearer.sha256, site.lab.now_utc())
+    newer(site, reward_minor=350)
     assert ("approve", PAY["reward_minor"]) in site.proposed()
 
 
