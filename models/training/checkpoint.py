@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import torch
-from safetensors import SafetensorError, safe_open
+from safetensors import SafetensorError
+from safetensors.torch import load as parse_tensors
 from safetensors.torch import save
 from torch import Tensor
 
@@ -69,15 +70,22 @@ def read(folder: Path) -> Checkpoint:
 
 
 def load(path: Path) -> Checkpoint:
-    """Read one file; see ``read``."""
+    """Read one file; see ``read``. A run may replace it meanwhile."""
     try:
-        with safe_open(path, "pt") as file:
-            facts = json.loads((file.metadata() or {})["facts"])
-            return Checkpoint({name: file.get_tensor(name) for name in file.keys()}, facts)  # noqa: SIM118
+        # safe_open opens it more than once: the header of one checkpoint, the content of another
+        content = path.read_bytes()
+        return Checkpoint(parse_tensors(content), json.loads(metadata(content)["facts"]))
     except FileNotFoundError:
         raise CheckpointError(f"{path}: missing; start the run without resuming") from None
     except (SafetensorError, KeyError, ValueError) as error:
         raise CheckpointError(f"{path}: damaged ({error})") from None
+
+
+def metadata(content: bytes) -> dict[str, str]:
+    """What a safetensors file says beside its tensors, in its header: eight bytes of length, then JSON."""
+    length = int.from_bytes(content[:8], "little")
+    header: dict[str, dict[str, str]] = json.loads(content[8 : 8 + length])
+    return header.get("__metadata__", {})
 
 
 def exists(folder: Path) -> bool:

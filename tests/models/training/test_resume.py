@@ -23,6 +23,14 @@ run(sys.argv[1], sys.argv[2], progress=False, checkpoint_every=int(sys.argv[3]) 
 """
 
 
+TAKE_TURNS = """
+import itertools, os, sys
+for name in itertools.cycle(sys.argv[1:]):
+    os.link(name, "next")
+    os.replace("next", "checkpoint.safetensors")
+"""
+
+
 ONE_PHASE = """
 [[phase]]
 name = "talk"
@@ -180,6 +188,31 @@ def test_a_damaged_checkpoint_is_named(recipe, finished):
     path.write_bytes(path.read_bytes()[:-100])
     with pytest.raises(CheckpointError, match=r"checkpoint\.safetensors: damaged"):
         run(recipe, finished, resume=True, progress=False)
+
+
+def test_a_checkpoint_is_read_whole_while_another_process_replaces_it(tmp_path):
+    """Small and large ones take turns, as a run's first one and the next, which holds an optimiser too."""
+    sizes = (10, 100_000)
+    for size in sizes:
+        write(tmp_path, {"weight": torch.full((size,), float(size))}, {"size": size}).rename(
+            tmp_path / str(size)
+        )
+    (tmp_path / FILE).hardlink_to(tmp_path / str(sizes[-1]))
+    turns = subprocess.Popen([sys.executable, "-c", TAKE_TURNS, *map(str, sizes)], cwd=tmp_path)
+    try:
+        while size_read(tmp_path) == sizes[-1]:
+            assert turns.poll() is None
+        assert {size_read(tmp_path) for _ in range(2000)} == set(sizes)
+    finally:
+        turns.kill()
+        turns.wait()
+
+
+def size_read(folder: Path) -> int:
+    """Size of the weight in the checkpoint, all of which was written at once."""
+    tensors, facts = read(folder)
+    assert torch.equal(tensors["weight"], torch.full((facts["size"],), float(facts["size"])))
+    return facts["size"]
 
 
 def test_a_missing_start_says_what_to_train_first(recipe, tmp_path):
