@@ -15,6 +15,7 @@ from models.training.situations import check_seeds
 
 OFF_BUDGET = 2.0  # score lost per message rate away from the budget, beyond the tolerance
 TOLERANCE = 0.01
+DRAWN_TOLERANCE = 0.05  # ... by which the gates that training draws may miss it; they are noisy
 HALVINGS = 12  # of the interval in which the gate's threshold is looked for: to 16 / 2**12 = .004
 CLOSE = 0.003  # a message rate so near below the budget is good enough
 REACH = 8.0  # largest move of the threshold, in the logit: gates drawn with .9997 can be closed too
@@ -43,8 +44,20 @@ class Checked(NamedTuple):
     """What is to be maximised."""
 
 
-def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Check) -> Checked:
-    """Evaluate with the messages and the gate of this phase."""
+def check(
+    env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Check, drawn_rate: float | None = None
+) -> Checked:
+    """Evaluate with the messages and the gate of this phase.
+
+    Args:
+        env: the world.
+        net: what people would meet.
+        phase: what it is taught now.
+        settings: how to judge.
+        drawn_rate: share of messages that the last update sent, with gates drawn. Off the budget it costs
+            score too: greedy gates keep the budget by their threshold alone, and the agent that is kept
+            could be one whose gates have not learned any yet.
+    """
     team = Team(env, RecurrentPolicy(net, phase.discrete, phase.gate == "open"))
     played = rollout.episodes(env, team, check_seeds(settings.episodes))
     success, steps = float(played.success.mean()), float(played.steps.mean())
@@ -60,7 +73,10 @@ def check(env: Environment[Any], net: RecurrentNet, phase: Phase, settings: Chec
         score = (1 - settings.human_weight) * score + settings.human_weight * (human + arrived) / 2
         rates.append(human_rate)
     if phase.budget is not None:
-        score -= OFF_BUDGET * sum(max(0.0, abs(rate - phase.budget) - TOLERANCE) for rate in rates)
+        missed = [abs(rate - phase.budget) - TOLERANCE for rate in rates]
+        if drawn_rate is not None:
+            missed.append(abs(drawn_rate - phase.budget) - DRAWN_TOLERANCE)
+        score -= OFF_BUDGET * sum(max(0.0, each) for each in missed)
     used = len(np.unique(played.tokens[played.gates]))
     return Checked(success, human, arrived, steps, reward, rates[0], human_rate, used, score)
 

@@ -185,7 +185,7 @@ class Trainer:
         self.just_checked = False
         phase = self.phase
         entropy = between(phase.entropy, phase.entropy_end, self.at, phase)
-        steps = 0
+        steps = sent = heard = 0
         for seen, rule in self._windows(phase, self.at.total):
             loss = gradient_loss(self.env, self.learner, seen, phase, entropy, self.enforcer, rule)
             self._descend(loss.total)
@@ -193,8 +193,11 @@ class Trainer:
             if self.enforcer is not None:
                 self.enforcer = self.enforcer.after(shares(seen))
             self._count(seen)
+            sent += int(seen.gate.detach()[_uttered(seen).to(self.device)].sum())
+            heard += int(seen.uttered.sum())
             steps += int((~np.stack([self.env.done(s) for s in seen.states[:-1]])).sum())
         self._read(seen)
+        self.readings.drawn_rate = sent / heard if heard else None
         self._revive(seen)
         self.at = self.at.updated(steps)
         if self.at.update % self.recipe.check.every == 0 or self.at.ends(phase):
@@ -204,9 +207,7 @@ class Trainer:
         self.clock.lap()
 
     def _read(self, seen: Unrolled) -> None:
-        """Entropy, decoder and message rate of the update's last window."""
-        sent = seen.gate.detach()[_uttered(seen).to(self.device)]
-        self.readings.drawn_rate = float(sent.mean()) if len(sent) else None
+        """Entropy and decoder of the update's last window."""
         logits = seen.logits.detach().log_softmax(1)
         self.readings.entropy = float(-(logits.exp() * logits).sum(1).mean())
         weighted = self._losses.get("decoder")
@@ -289,7 +290,8 @@ class Trainer:
         """Evaluate, keep the best, log, move on to the next phase if it is time, and write the checkpoint."""
         phase = self.phase
         net = self._judged()
-        checked = check(self.env, net, phase, self.recipe.check)
+        drawn_rate = self.readings.drawn_rate if _draws_gates(phase) else None
+        checked = check(self.env, net, phase, self.recipe.check, drawn_rate)
         better = checked.score > self.best_score
         if better:
             self.best_score = checked.score
@@ -311,7 +313,7 @@ class Trainer:
     def _judged(self) -> RecurrentNet:
         """The policy as people would meet it: greedy gates, with a threshold if drawn ones keep a budget."""
         phase, net = self.phase, self.learner.net
-        drawn = phase.gate in ("budget", "enforced") and phase.sampled
+        drawn = _draws_gates(phase)
         if self.device != CPU or drawn:
             net = copy.deepcopy(net).to(CPU)
         if drawn and phase.budget is not None:
@@ -383,6 +385,11 @@ class Trainer:
         """The best of the last regime."""
         self.learner.net.load_state_dict(self.best)
         return RecurrentPolicy(self.learner.net.to(CPU))
+
+
+def _draws_gates(phase: Phase) -> bool:
+    """Whether gates learn a budget by being drawn, so that greedy ones need a threshold."""
+    return phase.gate in ("budget", "enforced") and phase.sampled
 
 
 def _uttered(seen: Unrolled) -> Tensor:

@@ -57,6 +57,15 @@ def test_talking_off_the_budget_costs_score_on_either_side(env, net, aside):
     assert held.score == pytest.approx(free.score - 2 * (abs(aside) - 0.01))
 
 
+@pytest.mark.parametrize(("drawn", "cost"), [(0.5, 0), (0.54, 0), (0.46, 0), (0.9, 0.7), (0.1, 0.7)])
+def test_gates_drawn_off_the_budget_cost_score_although_greedy_ones_keep_it(env, net, drawn, cost):
+    calibrate(env, net, 0.5, SETTINGS)
+    phase = Phase(name="x", gate="enforced", budget=0.5)
+    free, held = check(env, net, phase, SETTINGS), check(env, net, phase, SETTINGS, drawn)
+    assert free[:-1] == pytest.approx(held[:-1], nan_ok=True)
+    assert held.score == pytest.approx(free.score - cost)
+
+
 def test_the_score_is_the_reward_where_a_recipe_says_so(env, net):
     by_success = check(env, net, Phase(name="x"), SETTINGS)
     by_reward = check(env, net, Phase(name="x"), Check(episodes=60, score="reward"))
