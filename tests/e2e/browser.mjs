@@ -182,12 +182,20 @@ export async function steps(page) {
 }
 
 /**
+ * Until the board takes a decision: before that, and for a moment after each, keys are not heard.
+ * @param {Place} page
+ */
+export async function ready(page) {
+  await page.locator(".key[aria-disabled=false]").first().waitFor();
+}
+
+/**
  * One key press, and the wait for what follows: another step on the meter, or the end of the round.
  * @param {Place} page
  * @param {string} key
  */
 export async function press(page, key) {
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   const before = await steps(page);
   await page.keyboard.press(key);
   await page.waitForFunction((count) => {

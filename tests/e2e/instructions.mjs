@@ -3,7 +3,7 @@
 // page of the board tell about their window. By keyboard only. Prints one JSON line for the test.
 
 import assert from "node:assert/strict";
-import { drawn, Participant, playing, press, result, SIZES } from "./browser.mjs";
+import { drawn, Participant, playing, press, ready, result, SIZES } from "./browser.mjs";
 
 /** @import { Page } from "playwright-core" */
 
@@ -140,7 +140,7 @@ async function fullScreen(who, page) {
   await result(page);
   await page.keyboard.press("Space");
   await page.waitForFunction(() => document.fullscreenElement !== null);
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
 }
 
 /**
@@ -154,7 +154,7 @@ async function leaveFullScreen(page) {
   while (await playing(page)) await press(page, "j");
   await result(page);
   await page.keyboard.press("Space");
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   assert.equal(await isFull(page), false);
 }
 
@@ -195,7 +195,7 @@ function watched() {
     await page.waitForTimeout(500);
     await hide(page);
     await page.reload();
-    await page.locator(".key[aria-disabled=false]").first().waitFor();
+    await ready(page);
     await page.goto("about:blank");
     await page.waitForTimeout(500);
   });

@@ -5,7 +5,7 @@
 import assert from "node:assert/strict";
 import { randomBytes } from "node:crypto";
 import { serve } from "../static/serve.mjs";
-import { drawn, Participant, passGate, playing, press, result, SIZES, steps, strip } from "./browser.mjs";
+import { drawn, Participant, passGate, playing, press, ready, result, SIZES, steps, strip } from "./browser.mjs";
 
 /** @import { Page } from "playwright-core" */
 
@@ -161,12 +161,12 @@ async function asParent(who, page) {
  * @param {Page} page
  */
 async function asChild(who, page) {
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   await who.look(page, "child-practice");
   await page.keyboard.press("5");
   await result(page);
   await onward(page);
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   await page.locator("[data-number='3']").hover();
   await who.look(page, "child-round");
   await page.keyboard.press("3");
@@ -175,7 +175,7 @@ async function asChild(who, page) {
   await result(page);
   await who.look(page, "child-round-over");
   await onward(page);
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   await page.locator("[data-number='7']").click();
   await result(page);
   await page.keyboard.press("Space");
@@ -232,7 +232,7 @@ async function traffic(base) {
  * @param {Page} page
  */
 async function offline(who, page) {
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   const before = await steps(page);
   await who.context.setOffline(true);
   await page.keyboard.press("f");
@@ -255,11 +255,11 @@ async function offline(who, page) {
  * @param {Page} page
  */
 async function secondTab(who, page) {
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   await press(page, "f");
   const newer = await who.tab();
   await newer.goto(page.url());
-  await newer.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(newer);
   assert.equal(await steps(newer), await steps(page), "the newer tab goes on at the same step");
   await page.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("Open in another tab"));
   await who.look(page, "driver-second-tab");
@@ -271,7 +271,7 @@ async function secondTab(who, page) {
   await page.bringToFront();
   await page.getByRole("button", { name: "Continue here" }).click();
   await newer.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("Open in another tab"));
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   assert.equal(await steps(page), await steps(newer), "back in the first tab at the step of the second");
 }
 
@@ -314,11 +314,12 @@ async function lostAnswer(base) {
     assert.equal(await steps(page), 1, "one press is one step, however often it was sent");
     await page.unroute("**/step");
     await page.route("**/step", (route) => route.abort());
+    await ready(page);
     await page.keyboard.press("j");
     await page.waitForFunction(() => document.querySelector("#strip")?.textContent?.includes("Connection lost"));
     await page.unroute("**/step");
     await page.reload();
-    await page.locator(".key[aria-disabled=false]").first().waitFor();
+    await ready(page);
     assert.equal(await steps(page), 2, "the kept step was sent after the reload");
     await drive(page);
   });
@@ -330,7 +331,7 @@ async function lostAnswer(base) {
  * @param {Page} page
  */
 async function movedOn(who, page) {
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   const mine = [...who.sent.values()].map((body) => JSON.parse(body)).at(-1);
   const status = await page.evaluate(
     async (step) => {
@@ -354,7 +355,7 @@ async function movedOn(who, page) {
  * @param {Page} page
  */
 async function hide(page) {
-  await page.locator(".key[aria-disabled=false]").first().waitFor();
+  await ready(page);
   const show = (/** @type {string} */ state) =>
     page.evaluate((value) => {
       Object.defineProperty(document, "visibilityState", { value, configurable: true });
@@ -378,7 +379,7 @@ async function example() {
     for (const [role, keys] of Object.entries(EXAMPLES)) {
       await page.goto(`${url}/example/?role=${role}`);
       for (const key of keys) {
-        await page.locator(".key[aria-disabled=false]").first().waitFor();
+        await ready(page);
         await page.keyboard.press(key);
         await page.waitForTimeout(80);
       }
