@@ -39,6 +39,9 @@ RESERVED = frozenset({"quiz", "attention", "probe"})
 Slug = Annotated[str, StringConstraints(pattern=r"^[a-z0-9][a-z0-9-]{0,47}$")]
 Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=200)]
 Paragraph = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=4_000)]
+HERE = r"http://(?:localhost|127\.0\.0\.1)(?::\d{1,5})?/"
+"""Only this machine may be reached without https: a made-up marketplace lives there."""
+Return = Annotated[str, StringConstraints(pattern=rf"^(https://\S+|{HERE}\S*)?$", max_length=500)]
 Code = Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_-]{1,64}$")]
 
 
@@ -133,7 +136,7 @@ class StudyDefinition(Part):
     duration_min: int = Field(ge=1, le=240)
     reward_text: Line
     completion_code: Code
-    completion_url: Annotated[str, StringConstraints(pattern=r"^(https://\S+)?$", max_length=500)] = ""
+    completion_url: Return = ""
     """Where the participant returns to, `{code}` in the place of the code; empty: no link."""
     lease_min: int = Field(default=60, ge=5, le=1_440)
     """A participant who has not been seen for longer no longer holds a place."""
@@ -151,6 +154,11 @@ class StudyDefinition(Part):
     """Parent & Lost Child: after the rounds, where does each sign point?"""
     codes: Codes = Codes()
     pay: Pay | None = None
+
+    @property
+    def returns_here(self) -> bool:
+        """Whether the completion link leads to this machine, where a made-up marketplace lives."""
+        return self.completion_url.startswith("http://")
 
     @property
     def role_orders(self) -> tuple[str, ...]:

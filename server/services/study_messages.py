@@ -16,7 +16,7 @@ PATTERNS = {
     "key": "Use small letters, digits and underscores, a letter first, at most 40.",
     "language": "Use a language's code, such as en or pt-BR.",
     "completion_code": "Use letters, digits, hyphens and underscores, at most 64.",
-    "completion_url": "Begin with https:// and leave no spaces, or leave it empty.",
+    "completion_url": "Begin with https:// (on this machine http://), with no spaces, or leave it empty.",
 }
 PATTERNS |= dict.fromkeys(("screened_out", "failed", "withdrawn"), PATTERNS["completion_code"])
 SENTENCES = {

@@ -18,6 +18,10 @@ from server.web.admin_pages import ConfirmPage, NoticePage
 from server.web.dependencies import CurrentLab
 from server.web.rendering import html
 
+RETURNS_HERE = (
+    "The completion link leads to this machine, as for a made-up marketplace: nobody else can follow it."
+)
+
 router = APIRouter(dependencies=[Depends(signed_in)])
 
 
@@ -80,6 +84,7 @@ def ask_to_launch(lab: CurrentLab, visitor: CurrentVisitor, slug: str) -> Respon
             "The study opens: whoever has a participant link can enter.",
             *(("People who have entered stay in the version they entered.",) if study.version else ()),
             f"The study is in {study.row.mode} mode: who enters counts as {study.row.mode} data.",
+            *((RETURNS_HERE,) if definition.returns_here else ()),
         )
         return ask(
             db,

@@ -110,6 +110,8 @@ def test_any_change_changes_the_hash() -> None:
         ("parent-child", "environment", "traffic_junction/medium"),
         ("parent-child", "completion_code", "no spaces"),
         ("parent-child", "completion_url", "http://example.org/{code}"),
+        ("parent-child", "completion_url", "http://127.0.0.1@example.org/{code}"),
+        ("parent-child", "completion_url", "http://127.0.0.1.example.org/{code}"),
         ("parent-child", "completion_url", "https://example.org/"),
         ("parent-child", "arms", []),
         ("parent-child", "surprise", 1),

@@ -134,6 +134,7 @@ def test_what_is_wrong_with_a_new_study_is_said_at_the_field(
         ("completion_code", "no spaces", "Use letters, digits, hyphens and underscores, at most 64."),
         ("completion_code", "", "Fill this in."),
         ("completion_url", "http://plain.example/{code}", "Begin with https://"),
+        ("completion_url", "http://localhost.example/{code}", "Begin with https://"),
         ("completion_url", "https://lab.example/done", "Must contain {code}."),
         ("lease_min", "1", "Enter at least 5."),
         ("quiz_tries", "6", "Enter at most 5."),
@@ -379,6 +380,21 @@ def test_launching_asks_then_freezes_the_version_and_opens_the_study(
     assert (number, study(person.lab, draft).row.status) == (1, "open")
     assert sha256 == canonical.sha256(definition)
     assert json.loads(definition)["title"] == "Rush hour"
+
+
+@pytest.mark.parametrize(
+    ("link", "warned"),
+    [("http://127.0.0.1:8010/submissions/complete?cc={code}", True), ("https://lab.example/{code}", False)],
+)
+def test_launching_says_so_if_the_completion_link_leads_to_this_machine(
+    person: Experimenter, draft: str, link: str, warned: bool
+) -> None:
+    assert person.save(draft, {"completion_url": link}, action="launch").status_code == 303
+    question = person.get(f"/admin/studies/{draft}/launch").text
+    assert ("leads to this machine" in question) is warned
+    person.confirm(draft, "launch")
+    [(_, definition, _)] = versions(person.lab, draft)
+    assert json.loads(definition)["completion_url"] == link
 
 
 def test_every_launched_version_can_be_read_as_it_was_launched(person: Experimenter, draft: str) -> None:
