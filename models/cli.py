@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from models.envs import registry
-from models.policies import bundle, scripted
+from models.policies import scripted
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -237,6 +237,7 @@ def release(
 ) -> None:
     """Make a bundle of a run: weights, lexicon, evaluation, card."""
     from models import release as releasing
+    from models.policies.bundle import BundleError
     from models.training import RecipeError, TrainingError
     from models.training.checkpoint import CheckpointError
 
@@ -244,7 +245,7 @@ def release(
         _check_name(name)
     try:
         made = releasing.release(run_dir, name, bundles, episodes)
-    except (releasing.ReleaseError, bundle.BundleError, RecipeError, TrainingError, CheckpointError) as error:
+    except (releasing.ReleaseError, BundleError, RecipeError, TrainingError, CheckpointError) as error:
         _refuse(error)
     typer.echo(f"{bundles / made.name}: sha256 {made.sha256}")
 
@@ -260,11 +261,12 @@ def bring(
 ) -> None:
     """Make a bundle of a policy that was trained elsewhere, as release does of a run."""
     from models import imported, release
+    from models.policies.bundle import BundleError
 
     _check_name(name)
     try:
         made = imported.bring(folder, name, bundles, episodes)
-    except (imported.ForeignError, release.ReleaseError, bundle.BundleError) as error:
+    except (imported.ForeignError, release.ReleaseError, BundleError) as error:
         _refuse(error)
     typer.echo(f"{bundles / made.name}: sha256 {made.sha256}")
 
@@ -312,6 +314,8 @@ def list_bundles(bundles: BundlesOption = BUNDLES) -> None:
     """List and verify all bundles; exit 1 if any is broken."""
     from rich.table import Table
 
+    from models.policies import bundle
+
     if not bundles.is_dir():
         _refuse(f"{bundles}: no such folder")
     found, errors = bundle.find(bundles)
@@ -335,6 +339,8 @@ def list_bundles(bundles: BundlesOption = BUNDLES) -> None:
 
 
 def _check_name(name: str) -> None:
+    from models.policies import bundle
+
     if not bundle.NAME.fullmatch(name):
         _refuse(f"name {name!r} is not of the form task_folder/name-1")
 
@@ -386,6 +392,8 @@ def _own_recipe(source: Path, folder: Path, seed: int | None, *, keep: bool) -> 
 
 
 def _bundle(name: str, root: Path) -> PolicyBundle:
+    from models.policies import bundle
+
     folder = Path(name) if Path(name).is_dir() else root / name
     if not folder.is_dir():
         known = sorted(path.parent.relative_to(root).as_posix() for path in root.glob("*/*/manifest.json"))

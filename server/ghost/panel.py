@@ -5,12 +5,18 @@ in the one-hot and the shuffled arm at position π(i). Numbers go to positions b
 arms. Both are drawn once, at enrolment, and stored with the participant.
 """
 
-from collections.abc import Sequence
+from __future__ import annotations
 
-from models.policies.bundle import PolicyBundle
+from typing import TYPE_CHECKING
+
 from server.domain.plan import SIGN_NUMBERS, SIGN_PLACES, permutation
 from server.domain.spec import Panel
-from server.domain.study import Communication
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from models.policies.bundle import PolicyBundle
+    from server.domain.study import Communication
 
 DIGITS = 4  # of a position in the unit square: 1/10,000 of the plane is less than a pixel
 

@@ -1,15 +1,21 @@
 """What an experimenter asks of a loaded agent: facts, figures, and what its tokens mean."""
 
-from collections.abc import Iterator, Mapping
+from __future__ import annotations
+
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from models.envs import registry
-from models.policies.bundle import PolicyBundle
 from server.domain.errors import NotFoundError
-from server.services.lab import Lab
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from models.policies.bundle import PolicyBundle
+    from server.services.lab import Lab
 
 SHOWN_MAX = 36
 FAINTEST = 0.02  # of the token's likeliest cell; fainter cells are left out of the picture

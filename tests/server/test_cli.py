@@ -311,6 +311,18 @@ def test_help_lists_the_commands_of_both_halves(hatlab: Shell) -> None:
         assert command in done.stdout
 
 
+def test_commands_that_need_no_agent_do_not_wait_for_torch() -> None:
+    code = (
+        "import sys, server.cli, models.cli; "
+        "from server.services import enrol, erase, poll, recruit, sheets, studies; "
+        "print('torch' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=REPOSITORY, capture_output=True, text=True, check=True, timeout=60
+    )
+    assert done.stdout == "False\n"
+
+
 def test_serving_never_loads_training(hatlab: Shell) -> None:
     code = (
         "import sys, server.cli, server.serving; "
