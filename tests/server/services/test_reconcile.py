@@ -1,7 +1,10 @@
 """Recruiting at the made-up Prolific: what is told moves people, and money is paid once."""
 
+import contextlib
 import hashlib
+import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any
@@ -10,10 +13,12 @@ import pytest
 from pydantic import SecretStr
 from sqlalchemy import update
 
+from server.domain import reconciliation
 from server.domain.errors import BadInputError, NotReadyError
+from server.domain.reconciliation import check_caps
 from server.recruitment.prolific_api import ProlificRecruiter
 from server.recruitment.recruiter import Change, RecruiterError, Submission
-from server.services import enrol, leave, reconcile, recruit
+from server.services import enrol, erase, leave, reconcile, recruit
 from server.services.lab import Lab
 from server.services.reconcile import Outcome
 from server.services.session import session_of
@@ -376,6 +381,77 @@ def test_a_second_posting_of_a_study_does_not_miss_the_people_of_the_first(site:
     recruit.poll(site.lab, other)
     with site.lab.database.reading() as db:
         assert reconcile.look(db, site.lab, other).mismatches == ()
+
+
+TIGHT = {**PAY, "cap_study_minor": 500}
+
+
+def test_two_postings_paid_at_once_stay_within_the_cap_of_their_study(
+    url: str, people: FakePeople, database: Database, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one = site_at(url, people, database, pay=TIGHT)
+    other = replace(one, posting_id=recruit.create(one.lab, SLUG, "prolific", 3, "The same again, at once."))
+    recruit.publish(other.lab, other.posting_id)
+    taken = [one.finish()[0], other.finish()[0]]
+    keys = [
+        [each.key for each in site.found().mismatches if each.action == "approve"] for site in (one, other)
+    ]
+    both = threading.Barrier(2)
+
+    def within(*amounts: Any) -> None:
+        """Both are within the cap before either is written down, unless one has to wait for the other."""
+        check_caps(*amounts)
+        with contextlib.suppress(threading.BrokenBarrierError):
+            both.wait(timeout=1)
+
+    monkeypatch.setattr(reconciliation, "check_caps", within)
+    with ThreadPoolExecutor(2) as pool:
+        paying = [
+            pool.submit(reconcile.confirm, site.lab, site.posting_id, mine, "ada")
+            for site, mine in zip((one, other), keys, strict=True)
+        ]
+    outcomes = [each for future in paying for each in future.result()]
+    assert sorted(each.done for each in outcomes) == [False, True]
+    assert "cap for the study" in next(each.says for each in outcomes if not each.done)
+    assert sum(people.rewards(each) for each in taken) == 1
+
+
+def test_a_person_is_not_erased_while_a_payment_to_them_begins(
+    site: Site, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    taken, key = site.finish()
+    keys = [each.key for each in site.found().mismatches if each.action == "approve"]
+    who = person(site.lab, key)
+    begun, noticed = threading.Event(), threading.Event()
+
+    def begin_payment(*row: Any) -> None:
+        begin(*row)
+        begun.set()
+        noticed.wait(timeout=1)  # written down and not yet to be seen: whoever erases has to wait for it
+
+    def erase_now() -> None:
+        begun.wait(timeout=10)
+        with site.lab.database.writing() as db:
+            known = erase.find_participant(db, site.lab, SLUG, who.id)
+            try:
+                erase.erase(db, known)
+            finally:
+                noticed.set()
+
+    begin = postings.begin_payment
+    monkeypatch.setattr(postings, "begin_payment", begin_payment)
+    with ThreadPoolExecutor(2) as pool:
+        paying = pool.submit(reconcile.confirm, site.lab, site.posting_id, keys, "ada")
+        erasing = pool.submit(erase_now)
+    assert [each.done for each in paying.result()] == [True]
+    assert site.people.rewards(taken) == 1
+    refused = erasing.exception()
+    if refused is None:  # it came after the end of the payment: the amount stays
+        with site.lab.database.reading() as db:
+            assert sum(postings.spent(db, who.study_id).values()) == PAY["reward_minor"]
+    else:
+        assert "on its way" in str(refused)
+        assert person(site.lab, key).id == who.id
 
 
 def test_a_person_whom_the_marketplace_does_not_remember_keeps_nobody_else_from_being_taken_in(
