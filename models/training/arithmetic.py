@@ -164,10 +164,16 @@ class Recall(torch.autograd.Function):
             parts: what is gathered.
         """
         ctx.save_for_backward(successor, last)
-        return tuple(part.index_select(0, row).index_fill_(0, fresh, 0) for part in parts)
+        return tuple(_gathered(part, row, fresh) for part in parts)
 
     @staticmethod
     def backward(ctx: Any, *slopes: Tensor) -> tuple[Tensor | None, ...]:
         successor, last = ctx.saved_tensors
-        back = (slope.index_select(0, successor).index_fill_(0, last, 0) for slope in slopes)
-        return None, None, None, None, *back
+        return None, None, None, None, *(_gathered(slope, successor, last) for slope in slopes)
+
+
+def _gathered(rows: Tensor, which: Tensor, none: Tensor) -> Tensor:
+    """Rows (W, H) of (R, H), zeros at the indices ``none``; all zeros where there are no rows."""
+    if not len(rows):
+        return rows.new_zeros(len(which), *rows.shape[1:])
+    return rows.index_select(0, which).index_fill_(0, none, 0)

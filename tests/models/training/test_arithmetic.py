@@ -116,6 +116,17 @@ def test_a_memory_is_recalled_once_and_its_gradient_goes_back_to_it() -> None:
     assert torch.autograd.gradcheck(lambda x: Recall.apply(*index, x), (part,))
 
 
+@pytest.mark.parametrize(("wanted", "held"), [(0, 3), (3, 0)])
+def test_a_step_without_anybody_recalls_nothing_and_is_recalled_by_nobody(wanted: int, held: int) -> None:
+    """The last episode of a batch has ended before its last step, or the first car comes late."""
+    part = torch.randn(held, 4, dtype=torch.float64, requires_grad=True)
+    nobody = [torch.zeros(wanted, dtype=torch.long), torch.arange(wanted)]
+    (recalled,) = Recall.apply(*nobody, torch.zeros(held, dtype=torch.long), torch.arange(held), part)
+    assert torch.equal(recalled, torch.zeros(wanted, 4))
+    (slope,) = torch.autograd.grad(recalled.sum(), part)
+    assert torch.equal(slope, torch.zeros(held, 4))
+
+
 @given(st.lists(st.integers(0, 5), min_size=1, max_size=30))
 def test_equal_observations_are_found_whatever_their_order(kinds: list[int]) -> None:
     table = np.random.default_rng(1).integers(0, 2, (6, 11)).astype(np.float32)
