@@ -375,7 +375,10 @@ def listen(port: int) -> socket.socket:
 
 
 def server(fake: FakeProlific) -> uvicorn.Server:
-    return uvicorn.Server(uvicorn.Config(create_app(fake), log_level="warning", access_log=False))
+    kept_s = 120  # a visitor comes back after minutes: their connection must not close at that very moment
+    app = create_app(fake)
+    config = uvicorn.Config(app, log_level="warning", access_log=False, timeout_keep_alive=kept_s)
+    return uvicorn.Server(config)
 
 
 def advice(url: str, token: str, webhook: Mapping[str, str]) -> str:
