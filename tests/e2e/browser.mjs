@@ -223,7 +223,9 @@ export async function leaveRound(page) {
   await page.evaluate(() => Object.assign(window, { here: true }));
   await page.keyboard.press("Space");
   await page.waitForFunction(
-    (text) => !("here" in window) || document.querySelector("#far")?.textContent !== text,
+    (text) =>
+      !("here" in window) ||
+      (document.querySelector("#far")?.textContent !== text && !document.querySelector("#strip .button-primary")),
     before,
   );
   return page.evaluate(() => !("here" in window));

@@ -5,7 +5,19 @@
 import assert from "node:assert/strict";
 import { randomBytes } from "node:crypto";
 import { serve } from "../static/serve.mjs";
-import { drawn, Participant, passGate, playing, press, ready, result, SIZES, steps, strip } from "./browser.mjs";
+import {
+  drawn,
+  leaveRound,
+  Participant,
+  passGate,
+  playing,
+  press,
+  ready,
+  result,
+  SIZES,
+  steps,
+  strip,
+} from "./browser.mjs";
 
 /** @import { Page } from "playwright-core" */
 
@@ -91,19 +103,6 @@ async function drive(page) {
   return result(page);
 }
 
-/**
- * On to what follows the finished round.
- * @param {Page} page
- */
-async function onward(page) {
-  const before = await page.locator("#far").textContent();
-  await page.keyboard.press("Space");
-  await page.waitForFunction(
-    (text) => /** @type {HTMLElement | null} */ (document.querySelector("#far"))?.textContent !== text,
-    before,
-  );
-}
-
 /** @param {string} base */
 async function parentChild(base) {
   return as("parent-child", async (who) => {
@@ -132,7 +131,7 @@ async function asParent(who, page) {
   await who.look(page, "parent-practice");
   await search(page);
   await who.look(page, "parent-practice-over");
-  await onward(page);
+  await leaveRound(page);
   await who.look(page, "parent-round");
   await page.keyboard.press("ArrowLeft");
   await press(page, "ArrowUp");
@@ -150,7 +149,7 @@ async function asParent(who, page) {
   await who.look(page, "parent-round-over");
   await page.reload();
   assert.equal(await result(page), said, "a reload shows the end again");
-  await onward(page);
+  await leaveRound(page);
   await search(page);
   await page.keyboard.press("Space");
 }
@@ -165,7 +164,7 @@ async function asChild(who, page) {
   await who.look(page, "child-practice");
   await page.keyboard.press("5");
   await result(page);
-  await onward(page);
+  await leaveRound(page);
   await ready(page);
   await page.locator("[data-number='3']").hover();
   await who.look(page, "child-round");
@@ -174,7 +173,7 @@ async function asChild(who, page) {
   await who.look(page, "child-replay");
   await result(page);
   await who.look(page, "child-round-over");
-  await onward(page);
+  await leaveRound(page);
   await ready(page);
   await page.locator("[data-number='7']").click();
   await result(page);
@@ -209,15 +208,15 @@ async function traffic(base) {
       await who.look(page, "driver-practice");
       await drive(page);
       await who.look(page, "driver-practice-over");
-      await onward(page);
+      await leaveRound(page);
       await who.look(page, "driver-round");
       await offline(who, page);
       await drive(page);
       await who.look(page, "driver-round-over");
-      await onward(page);
+      await leaveRound(page);
       await secondTab(who, page);
       await drive(page);
-      await onward(page);
+      await leaveRound(page);
       await drive(page);
       await page.keyboard.press("Space");
       await complete(who, page);
